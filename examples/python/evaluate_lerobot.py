@@ -38,6 +38,7 @@ DEFAULT_ARGUMENTS = [
     "--env.size=96",
     "--eval.batch_size=1",
     "--eval.n_episodes=1",
+    "--env.variation=none",
 ]
 
 
@@ -56,6 +57,10 @@ class TrocarConfig(EnvConfig):
     normalize: bool = False
     #: Maximum duration of an episode (s), by default the scene's.
     episode_s: float | None = None
+    #: What varies: none, easy, standard or hard; by default the set of the scene, or standard.
+    variation: str | None = None
+    #: Seen episodes, unseen ones, or both.
+    split: str = "seen"
 
     def __post_init__(self) -> None:
         """Declares observations and actions by LeRobot's names."""
@@ -85,6 +90,8 @@ class TrocarConfig(EnvConfig):
             "image_size": (self.size, self.size),
             "normalize": self.normalize,
             "episode_s": self.episode_s,
+            "variation": self.variation,
+            "split": self.split,
             "render_mode": "rgb_array",
         }
 

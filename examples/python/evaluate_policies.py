@@ -30,6 +30,12 @@ def main() -> None:
     parser.add_argument("--task", default="grasp-lift", choices=sorted(trocar.TASKS.values()))
     parser.add_argument("--seconds", type=float, default=15.0, help="longest episode")
     parser.add_argument(
+        "--variation",
+        default="none",
+        help="what varies: none, easy, standard or hard (default: %(default)s; the anatomies of "
+        "standard take minutes to make)",
+    )
+    parser.add_argument(
         "-o", "--output", type=Path, help="campaign folder (default: one that is removed)"
     )
     options = parser.parse_args()
@@ -39,7 +45,13 @@ def main() -> None:
         scene = Path(folder) / "scene.toml"
         scene.write_text(text.replace("episode_s = 40.0", f"episode_s = {options.seconds}"))
         output = options.output or Path(folder) / "campaign"
-        result = campaign.run(str(scene), ["scripted", "random"], output, episodes=options.episodes)
+        result = campaign.run(
+            str(scene),
+            ["scripted", "random"],
+            output,
+            episodes=options.episodes,
+            variation=options.variation,
+        )
         print(f"{'policy':<12} {'passed':>7} {'95% interval':>13} {'score':>6}")
         for row in result["policies"]:
             low, high = row["interval"]["low"], row["interval"]["high"]
@@ -48,7 +60,7 @@ def main() -> None:
             print(f"{row['policy']:<12} {passed} {interval} {row['mean_score']:>7.2f}")
 
     name = next(name for name, task in trocar.TASKS.items() if task == options.task)
-    env = gym.make(name, episode_s=options.seconds)
+    env = gym.make(name, episode_s=options.seconds, variation=options.variation)
     scores = []
     for seed in range(options.episodes):
         state, info = env.reset(seed=seed)

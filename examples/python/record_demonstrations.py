@@ -18,10 +18,16 @@ import trocar
 from trocar.datasets import LeRobotWriter, Recorder, features_of
 
 
-def record(output: Path, episodes: int, size: int, version: str, seconds: float | None) -> int:
+def record(
+    output: Path, episodes: int, size: int, version: str, seconds: float | None, variation: str
+) -> int:
     """Records the scripted controller's episodes that pass. Returns their number."""
     env = gym.make(
-        "trocar/GraspLift-v0", obs="state+rgb", image_size=(size, size), episode_s=seconds
+        "trocar/GraspLift-v0",
+        obs="state+rgb",
+        image_size=(size, size),
+        episode_s=seconds,
+        variation=variation,
     )
     writer = LeRobotWriter(output, fps=30, features=features_of(env), version=version)
     recorder, expert, passed = (
@@ -46,11 +52,22 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=2)
     parser.add_argument("--size", type=int, default=224, help="edge of the pictures (px)")
     parser.add_argument("--seconds", type=float, help="maximum duration (s) (default: the scene's)")
+    parser.add_argument(
+        "--variation",
+        default="none",
+        help="what varies: none, easy, standard or hard (default: %(default)s; the anatomies of "
+        "standard take minutes to make)",
+    )
     parser.add_argument("--version", default="v3.0", choices=["v3.0", "v2.1"])
     parser.add_argument("-o", "--output", type=Path, default=Path("lifts"))
     options = parser.parse_args()
     passed = record(
-        options.output, options.episodes, options.size, options.version, options.seconds
+        options.output,
+        options.episodes,
+        options.size,
+        options.version,
+        options.seconds,
+        options.variation,
     )
     print(f"{passed} of {options.episodes} passed and are kept")
     if not passed:

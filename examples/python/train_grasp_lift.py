@@ -62,6 +62,9 @@ class LiftCells(VecEnv):
             autoreset_mode="same-step",
             episode_s=seconds,
             privileged=True,
+            # The fixed cell, in which only the starts of the arms vary.
+            variation="none",
+            split="both",
         )
         # Its own attributes are not in Gymnasium's types.
         self.cells = cast(Any, envs)

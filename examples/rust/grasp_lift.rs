@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let recording = task::run(&mut episode, policy.as_mut(), 0, &mut |_| true)?;
     let lift = recording.channels.iter().map(|row| row.task.lift_mm).fold(0.0, f64::max);
     for stage in &episode.progress().stages {
-        println!("{}: {}", stage.stage.name(), if stage.passed { "passed" } else { "not passed" });
+        println!("{}: {}", stage.stage, if stage.passed { "passed" } else { "not passed" });
     }
     println!("lifted by {lift:.1} mm in {:.1} s of simulated time", episode.time());
     Ok(())

@@ -34,6 +34,7 @@ def measured(
         [policy],
         folder,
         episodes=episodes,
+        variation="none",
         workers=workers,
         ray_address=address,
         progress=record_time,

@@ -21,6 +21,7 @@ def measured(cells: int, obs: str, steps: int, threads: int) -> dict[str, float]
     """Steps `cells` cells with the same small random motions."""
     name = "trocar/GraspLift-v0"
     options: dict[str, Any] = {"obs": obs, "threads": threads, "normalize": True, "actions": "tip"}
+    options["variation"] = "none"
     start = time.process_time()
     envs = gym.make_vec(
         name, num_envs=cells, vectorization_mode="vector_entry_point", copy=False, **options

@@ -10,8 +10,8 @@ import pytest
 
 import trocar  # noqa: F401  (registers the environments)
 
-#: Short episodes are enough for tests of the contract.
-SHORT = {"episode_s": 0.4}
+#: Short episodes of the fixed cell are enough for tests of the contract.
+SHORT = {"episode_s": 0.4, "variation": "none"}
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ import pytest
 from trocar import _ray, _threads, campaign
 from trocar._progress import LOG_INTERVAL_S, Bar
 
-OPTIONS = {"episodes": 2, "seed": 5}
+OPTIONS = {"episodes": 2, "seed": 5, "variation": "none"}
 POLICIES = ["scripted", "random"]
 
 #: A policy that blocks when it acts, or with $LOADS_SLOWLY when it is loaded.
@@ -59,7 +59,11 @@ def test_threads_keep_every_episode_and_resume(short_scene, local):
     )
     assert done == [(0, 1), (1, 1)] and again["hash"] == result["hash"]
     with pytest.raises(ValueError, match="another seed"):
-        campaign.run(str(short_scene), POLICIES, folder / "local", episodes=2, seed=6)
+        campaign.run(str(short_scene), POLICIES, folder / "local", **(OPTIONS | {"seed": 6}))
+    with pytest.raises(ValueError, match="another split"):
+        campaign.run(str(short_scene), POLICIES, folder / "local", **OPTIONS, split="unseen")
+    with pytest.raises(ValueError, match=r"--by modulous: .*did you mean 'modulus'"):
+        campaign.run(str(short_scene), POLICIES, folder / "new", **OPTIONS, by=["modulous"])
 
 
 def test_ray_gives_the_same_bits_with_a_lost_worker(short_scene, local, monkeypatch):
@@ -106,8 +110,11 @@ class Other:
     def here(self):
         pass
 
-other = Other.remote() ray.get(other.here.remote()) result = campaign.run(sys.argv[1], ["random"],
-sys.argv[2], episodes=3, workers=2, ray_address="local") print("episodes", result["episodes"])
+other = Other.remote()
+ray.get(other.here.remote())
+result = campaign.run(sys.argv[1], ["random"], sys.argv[2], episodes=3, workers=2,
+                      ray_address="local", variation="none")
+print("episodes", result["episodes"])
 """
 
 
@@ -127,6 +134,7 @@ def test_on_ray_a_policy_that_cannot_be_loaded_is_one_line(short_scene, tmp_path
             ["python:nowhere.py:act"],
             tmp_path / "out",
             episodes=1,
+            variation="none",
             ray_address="local",
             workers=1,
         )
@@ -166,6 +174,8 @@ def test_ctrl_c_ends_a_campaign_that_waits_for_a_policy(short_scene, tmp_path, h
         *words,
         "--episodes",
         "2",
+        "--variation",
+        "none",
         "--workers",
         "1",
         "-o",
@@ -218,7 +228,11 @@ def test_python_policies_are_served_by_this_interpreter_and_nothing_stays_set(
     )
     before = dict(os.environ)
     result = campaign.run(
-        str(short_scene), [f"w=python:{tmp_path}/who.py:act"], tmp_path / "out", episodes=1
+        str(short_scene),
+        [f"w=python:{tmp_path}/who.py:act"],
+        tmp_path / "out",
+        episodes=1,
+        variation="none",
     )
     assert (
         result["policies"][0]["ends"]["policy-error"] == 0
@@ -256,7 +270,7 @@ def test_a_campaign_that_fails_before_its_first_episode_leaves_no_folder(
 
     monkeypatch.setattr(_threads, "Worker", Broken)
     with pytest.raises(ValueError, match="no cell"):
-        campaign.run(str(short_scene), ["random"], tmp_path / "out", episodes=1)
+        campaign.run(str(short_scene), ["random"], tmp_path / "out", episodes=1, variation="none")
     assert not (tmp_path / "out").exists()
 
 

@@ -85,6 +85,8 @@ def test_wrong_actions_are_refused_by_name_and_change_nothing(one):
         ({"image_size": 64}, "image_size: is 64"),
         ({"image_size": (64.5, 64)}, "image_size: .*integers in"),
         ({"image_size": "64"}, "image_size"),
+        ({"variation": "some"}, "variation: 'some' .*none, easy, standard, hard"),
+        ({"split": "test"}, "split: 'test' .*seen, unseen, both"),
     ]:
         with pytest.raises(ValueError, match=words):
             trocar.TrocarEnv(**({"task": "grasp-lift"} | options))
@@ -95,7 +97,7 @@ def test_wrong_actions_are_refused_by_name_and_change_nothing(one):
 def test_two_processes_give_the_same_numbers(one):
     script = (
         "import trocar, numpy as np\n"
-        "env = trocar.TrocarEnv(task='grasp-lift', episode_s=0.4, threads=1)\n"
+        "env = trocar.TrocarEnv(task='grasp-lift', episode_s=0.4, threads=1, variation='none')\n"
         "env.reset(seed=3); dice = np.random.default_rng(1)\n"
         "low, high = env.action_space.low, env.action_space.high\n"
         "for _ in range(8): env.step(dice.uniform(low, high))\n"
@@ -136,7 +138,7 @@ def test_a_state_of_another_scene_is_refused_and_changes_nothing(one, tmp_path):
     other = trocar.TrocarEnv(task="port-reach", **SHORT)
     path = changed_scene(tmp_path, "grasp-lift", 0.4)
     path.write_text(path.read_text().replace("control_hz = 30", "control_hz = 60"))
-    faster = trocar.TrocarEnv(str(path))
+    faster = trocar.TrocarEnv(str(path), variation="none")
     other.reset(seed=5)
     faster.reset(seed=5)
     one.reset(seed=6)
@@ -179,11 +181,45 @@ def test_calls_in_the_wrong_order_raise_without_wrappers():
 def test_wrong_seeds_are_refused_by_name(one):
     assert (
         one.reset(seed=np.int64(3))[1]["seed"] == 3
-        and one.reset(seed=2**63 - 1)[1]["seed"] == 2**63 - 1
+        and one.reset(seed=10**6 - 1)[1]["seed"] == 10**6 - 1
     )
-    for seed in (-1, 2**63, 2**64, 1.5):
+    for seed in (-1, 10**6, 2**63, 2**64, 1.5):
         with pytest.raises(ValueError, match="seed: is "):
             one.reset(seed=seed)
+
+
+def test_training_does_not_reach_unseen_episodes(tmp_path):
+    # Two anatomies of the same folder: one is seen, the other is not.
+    lines = [
+        "[variation.specimens]",
+        'phantoms = ["phantom-a"]',
+        "seeds = [1, 1]",
+    ]
+    path = changed_scene(tmp_path, "grasp-lift", 0.1)
+    path.write_text(path.read_text() + "\n".join(["", *lines, ""]))
+    seen = trocar.TrocarEnv(str(path), variation="easy")
+    assert all(seen.reset()[1]["seed"] < 10**6 for _ in range(3))
+    with pytest.raises(
+        ValueError, match=r"seed: is 1000000; seeds of split seen are in \[0, 999999"
+    ):
+        seen.reset(seed=10**6)
+    unseen = trocar.TrocarEnv(str(path), variation="easy", split="unseen")
+    assert unseen.reset()[1]["seed"] >= 10**6
+    info = unseen.reset(seed=10**6 + 3)[1]
+    assert info["seed"] == 10**6 + 3 and "modulus_kpa" in info["drawn"]
+    with pytest.raises(ValueError, match="seed: is 3; seeds of split unseen"):
+        unseen.reset(seed=3)
+
+
+def test_an_environment_varies_unless_it_is_told_otherwise(lift_scene, monkeypatch, tmp_path):
+    # The scene names one anatomy, so that no others are made.
+    path = changed_scene(tmp_path, "grasp-lift", 0.1)
+    one_anatomy = '\n[variation.specimens]\nphantoms = ["phantom-a"]\nseeds = [1, 1]\n'
+    path.write_text(path.read_text() + one_anatomy)
+    drawn = trocar.TrocarEnv(str(path)).reset(seed=0)[1]["drawn"]
+    assert {"modulus_kpa", "friction", "endoscope.camera_shift_mm.x"} <= set(drawn)
+    fixed = trocar.TrocarEnv(str(path), variation="none").reset(seed=0)[1]["drawn"]
+    assert "modulus_kpa" not in fixed and "left.tilt_deg" in fixed
 
 
 def test_the_state_alone_can_be_in_a_dict():
@@ -197,10 +233,10 @@ def test_the_state_alone_can_be_in_a_dict():
 def test_the_rate_is_that_of_the_scene(one, tmp_path):
     path = changed_scene(tmp_path, "port-reach", 0.5)
     path.write_text(path.read_text().replace("control_hz = 30", "control_hz = 60"))
-    env = trocar.TrocarEnv(str(path))
+    env = trocar.TrocarEnv(str(path), variation="none")
     assert env.metadata["render_fps"] == 60 and one.metadata["render_fps"] == 30
     assert trocar.TrocarEnv.metadata["render_fps"] == 30, "the class is as it was"
-    envs = trocar.TrocarVectorEnv(1, str(path))
+    envs = trocar.TrocarVectorEnv(1, str(path), variation="none")
     assert envs.metadata["render_fps"] == envs.envs[0].metadata["render_fps"] == 60
 
 

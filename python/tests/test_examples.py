@@ -88,7 +88,9 @@ def test_the_policy_of_the_guide_runs(short_scene, tmp_path):
     ]
     (tmp_path / "still.py").write_text("\n".join(kept))
     policy = f"still=python:{tmp_path / 'still.py'}:Still"
-    result = campaign.run(str(short_scene), [policy], tmp_path / "out", episodes=1)
+    result = campaign.run(
+        str(short_scene), [policy], tmp_path / "out", episodes=1, variation="none"
+    )
     (row,) = result["policies"]
     kept = json.loads((tmp_path / "out/episodes/still/000000/result.json").read_text())
     assert row["ends"]["policy-error"] == 0, kept["end"]

@@ -78,7 +78,7 @@ def evaluated(env, policy, seeds):
 
 
 def test_the_factory_makes_environments_with_their_task(example):
-    config = example.TrocarConfig(episode_s=0.1, size=32, cameras=["d405"])
+    config = example.TrocarConfig(variation="none", episode_s=0.1, size=32, cameras=["d405"])
     envs = make_env(config, n_envs=2)
     env, policy = envs["trocar"][0], Still()
     given = evaluated(env, policy, [1, 2])
@@ -100,9 +100,16 @@ def test_the_factory_makes_environments_with_their_task(example):
 
 
 def test_success_is_read_from_one_cell_and_from_many(example):
-    alone = make_env(example.TrocarConfig(cameras=[], episode_s=20.0), n_envs=1)["trocar"][0]
+    alone = make_env(example.TrocarConfig(variation="none", cameras=[], episode_s=20.0), n_envs=1)[
+        "trocar"
+    ][0]
     many = trocar.TrocarVectorEnv(
-        2, task="grasp-lift", obs="agent_pos", episode_s=20.0, autoreset_mode="same-step"
+        2,
+        task="grasp-lift",
+        obs="agent_pos",
+        episode_s=20.0,
+        variation="none",
+        autoreset_mode="same-step",
     )
     for env, seeds in [(alone, [0]), (many, [0, 1])]:
         given = evaluated(env, Expert(env.envs), seeds)

@@ -143,11 +143,11 @@ def test_the_scripted_controller_is_the_programs_bit_for_bit(program, lift_scene
     for command in (["episode"], ["evaluate", "--episodes", "1"]):
         out = tmp_path / command[0]
         words = [*command, lift_scene, "--policy", "scripted", "--seed", 11, "-o", out]
-        called = [program, "--quiet", *words, "--phantoms", phantoms]
+        called = [program, "--quiet", *words, "--variation", "none", "--phantoms", phantoms]
         subprocess.run(list(map(str, called)), check=True, capture_output=True)
         recorded.append(steps(next(out.rglob("episode.trocar"))))
     assert np.array_equal(recorded[0], recorded[1])
-    env = trocar.TrocarEnv(scene=str(lift_scene), threads=2)
+    env = trocar.TrocarEnv(scene=str(lift_scene), threads=2, variation="none")
     expert = trocar.Policy("scripted")
     env.reset(seed=11)
     expert.reset(env)
@@ -173,6 +173,8 @@ def command_of(program, scene, tmp_path, policies):
         *named,
         "--episodes",
         "2",
+        "--variation",
+        "none",
         "-o",
         tmp_path / "out",
     ]
@@ -257,7 +259,7 @@ def test_the_program_evaluates_a_python_policy_and_survives_one_that_raises(
         assert why.startswith("python:mine:raises: RuntimeError: no idea what to do"), why
     assert reads["ends"]["policy-error"] == 2
     kept = json.loads((tmp_path / "out/episodes/reads/000000/result.json").read_text())
-    asked = trocar.TrocarEnv(scene=str(short_scene)).task_description
+    asked = trocar.TrocarEnv(scene=str(short_scene), variation="none").task_description
     assert f"asked to {asked}" in kept["end"]["why"], (
         "a served policy and an environment get the same prompt"
     )

@@ -18,6 +18,11 @@ def scenes() -> list[str]:
 def phantoms_folder() -> Path:
     """The folder of made phantoms: `$TROCAR_PHANTOMS`, or `trocar/phantoms` in the user's cache."""
 
+def missing_specimens(
+    scene: str, variation: str | None, split: str, phantoms: str | PathLike[str]
+) -> int:
+    """Number of anatomies that episodes of a scene draw from and that are not made yet."""
+
 def policies() -> list[str]:
     """Names of the built-in controllers."""
 
@@ -45,6 +50,8 @@ class Cells:
         actions: str = "pivots",
         episode_s: float | None = None,
         sensor_noise: bool = False,
+        variation: str | None = None,
+        split: str = "seen",
     ) -> None: ...
     @property
     def count(self) -> int: ...
@@ -116,6 +123,10 @@ class Campaign:
         seed: int,
         phantoms: str | PathLike[str],
         output: str | PathLike[str],
+        *,
+        split: str = "seen",
+        variation: str | None = None,
+        by: list[str] = ...,
     ) -> None: ...
     @property
     def plan(self) -> str: ...

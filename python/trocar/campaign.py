@@ -44,6 +44,9 @@ def run(
     *,
     episodes: int = 15,
     seed: int = 0,
+    split: str = "seen",
+    variation: str | None = None,
+    by: Sequence[str] = (),
     workers: int | None = None,
     ray_address: str | None = None,
     retry_failed: bool = False,
@@ -51,6 +54,7 @@ def run(
 ) -> dict[str, Any]:
     """Runs the missing episodes of the campaign in `output` and returns its `result.json`.
 
+    - `split`, `variation`, `by`: as `--split`, `--variation` and `--by` of `trocar evaluate`.
     - `ray_address`: `auto` for a running cluster, `local` for a new one on this machine,
       `host:port`; None runs without Ray.
     - `workers`: episodes at once (default: one a CPU).
@@ -72,7 +76,17 @@ def run(
     folder = phantoms_folder()
     folder.mkdir(parents=True, exist_ok=True)
     is_new = not output.exists()
-    campaign = Campaign(scene, list(policies), episodes, seed, folder, output)
+    campaign = Campaign(
+        scene,
+        list(policies),
+        episodes,
+        seed,
+        folder,
+        output,
+        split=split,
+        variation=variation,
+        by=list(by),
+    )
     progress = progress or (lambda done, missing: None)
     try:
         jobs = campaign.missing(retry_failed)
@@ -112,7 +126,28 @@ def main(arguments: list[str] | None = None) -> int:
         "--episodes", type=int, default=15, help="episodes of each policy (default %(default)s)"
     )
     parser.add_argument(
-        "--seed", type=int, default=0, help="seed of the first episode (default %(default)s)"
+        "--seed",
+        type=int,
+        default=0,
+        help="number of the first episode in the split (default %(default)s)",
+    )
+    parser.add_argument(
+        "--split",
+        choices=["seen", "unseen", "both"],
+        default="seen",
+        help="episodes to train on, episodes kept apart, or both (default %(default)s)",
+    )
+    parser.add_argument(
+        "--variation",
+        choices=["none", "easy", "standard", "hard"],
+        help="what varies (default: the set of the scene, or standard if it has none)",
+    )
+    parser.add_argument(
+        "--by",
+        type=lambda names: names.split(","),
+        default=[],
+        metavar="NAMES",
+        help="show success by these, as in trocar evaluate (default: all that varies)",
     )
     parser.add_argument("--workers", type=int, help="episodes at once (default: one a CPU)")
     parser.add_argument(
@@ -155,6 +190,9 @@ def main(arguments: list[str] | None = None) -> int:
             options.output,
             episodes=options.episodes,
             seed=options.seed,
+            split=options.split,
+            variation=options.variation,
+            by=options.by,
             workers=options.workers,
             ray_address=options.ray,
             retry_failed=options.retry_failed,
@@ -184,6 +222,10 @@ def main(arguments: list[str] | None = None) -> int:
                     f"{row['policy']}: the policy failed in {failed} of {row['episodes']}, "
                     f"first: {row['policy_error']}; --retry-failed runs them again"
                 )
+        if (distinct := result["distinct_outcomes"]) < result["episodes"]:
+            print(
+                f"warning: only {distinct} of {result['episodes']} episodes differ from each other"
+            )
         print(f"states {result['hash']}\nreport {result['report']}")
     return 0
 

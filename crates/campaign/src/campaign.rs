@@ -1,5 +1,6 @@
 //! A campaign on this machine: runs the missing episodes, several at once.
 
+use crate::by::By;
 use crate::csv_table::csv_table;
 use crate::manifest::{self, Manifest};
 use crate::page;
@@ -14,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use trocar_core::{Progress, Silent};
-use trocar_scene::{Scene, SpecimenSource, VariationSet};
+use trocar_scene::{Scene, Split, VariationSet};
 use trocar_workflow::{Error, Result, SpecimenCache, drawn_specimens, read_varied, refuse_overlap};
 
 /// Maximum number of parallel episodes per core. Each has its own cell in memory.
@@ -22,6 +23,9 @@ const JOBS_PER_CORE: usize = 8;
 /// This many parallel episodes are allowed on any machine, because waiting for a server needs no
 /// core.
 const MIN_JOB_LIMIT: usize = 32;
+
+/// The set by which campaigns and environments vary unless the scene or the user names another.
+pub const DEFAULT_VARIATION: VariationSet = VariationSet::Standard;
 
 /// A campaign on this machine.
 #[derive(Clone, Debug)]
@@ -32,11 +36,16 @@ pub struct Campaign {
     pub policies: Vec<PolicySpec>,
     /// Number of episodes per policy.
     pub episodes: usize,
-    /// Seed of the first episode; the following episodes have the following seeds. All policies
-    /// have the same seeds.
+    /// Which episodes: seen, unseen or both in turn.
+    pub split: Split,
+    /// Number of the first episode in the split; the following episodes have the following numbers.
+    /// All policies have the same seeds.
     pub seed: u64,
-    /// The set of factors that vary between episodes, instead of the scene's.
+    /// The set of factors that vary between episodes, instead of the scene's. Without one, a scene
+    /// that has no set varies by [`DEFAULT_VARIATION`].
     pub variation: Option<VariationSet>,
+    /// What success is shown by: factors, groups, drawn numbers; all that varies if empty.
+    pub by: Vec<String>,
     /// Number of parallel episodes; 0 for one per core. Results do not depend on it.
     pub jobs: usize,
     /// Runs episodes again whose policy failed.
@@ -54,12 +63,13 @@ impl Campaign {
     /// ([`Error::Stopped`]) loses only running episodes; table and report then show the finished
     /// ones.
     pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<CampaignResult> {
-        let (store, manifest) = self.run_episodes(output, None, progress)?;
-        store.write_results(&manifest)
+        let (store, manifest, by) = self.run_episodes(output, None, progress)?;
+        store.write_results(&manifest, &by)
     }
 
     /// Runs the missing episodes of the campaign in `output`, at most `max_episodes` in total, and
-    /// renders videos of some failures and successes. Returns the campaign's store and manifest.
+    /// renders videos of some failures and successes. Returns the campaign's store and manifest, and
+    /// what success is shown by.
     ///
     /// # Errors
     /// As [`run`](Self::run).
@@ -68,8 +78,8 @@ impl Campaign {
         output: &Path,
         max_episodes: Option<usize>,
         progress: &dyn Progress,
-    ) -> Result<(Store, Manifest)> {
-        let scene = read_varied(&self.scene, self.variation)?;
+    ) -> Result<(Store, Manifest, Vec<By>)> {
+        let scene = read_varied(&self.scene, self.variation, DEFAULT_VARIATION)?;
         refuse_overlap(Path::new(&self.scene), output)?;
         // Making a specimen takes minutes, so everything that does not need it is checked first.
         manifest::check(&self.policies, self.episodes, self.seed, max_episodes)?;
@@ -79,31 +89,30 @@ impl Campaign {
             let reason = format!("--jobs {}: it must be at most {allowed} on {cores} cores", self.jobs);
             return Err(Error::Mismatch(reason));
         }
-        store::check_compatible(output, &self.policies, self.seed)?;
+        let by = By::parse(&self.by, &scene, self.split)?;
+        let first = (self.split, self.seed);
+        store::check_compatible(output, &self.policies, first, &scene.variation)?;
         // Policies are loaded before anything is built or written.
         let missing = |p: &&PolicySpec| self.retry_failed || !store::has_episodes(output, &p.name, self.episodes);
         let policies: Vec<&PolicySpec> = self.policies.iter().filter(missing).collect();
         let servers = start_servers(&policies, progress)?;
         let specimens = SpecimenCache::new(&scene, &self.phantoms);
-        let named = manifest::named_specimen(&scene);
-        // The check above excludes an overflow.
-        let seeds = (0..self.episodes as u64).map(|k| self.seed.saturating_add(k));
-        let others = drawn_specimens(&scene, seeds).into_iter().filter(|s| *s != named);
-        let needed: Vec<SpecimenSource> = std::iter::once(named.clone()).chain(others).collect();
-        specimens.make_all(&needed, progress)?;
-        let named = specimens.read(&named, &Silent)?;
-        let mut manifest = Manifest::new(&scene, &named, &self.policies, self.episodes, self.seed)?;
+        let named = manifest::named_specimen(&scene, self.split);
+        specimens.make_all(std::slice::from_ref(&named), progress)?;
+        let specimen = specimens.read(&named, &Silent)?;
+        let mut manifest = Manifest::new(&scene, &specimen, &self.policies, self.episodes, first)?;
         manifest.max_episodes = max_episodes;
+        specimens.make_all(&drawn_specimens(&scene, manifest.seeds()), progress)?;
         let store = Store::open(output, &manifest)?;
         let workers = if self.jobs == 0 { cores } else { self.jobs };
         let done = self
             .run_missing(&scene, &specimens, &manifest, &store, workers, servers, progress)
             .and_then(|()| store.write_videos(&manifest, &scene, &specimens, progress));
         match done {
-            Ok(()) => Ok((store, manifest)),
+            Ok(()) => Ok((store, manifest, by)),
             Err(Error::Interrupted) => {
                 progress.end();
-                let kept = store.write_results(&manifest)?.episodes;
+                let kept = store.write_results(&manifest, &by)?.episodes;
                 Err(Error::Stopped { kept, planned: manifest.count() })
             }
             Err(why) => Err(why),
@@ -130,7 +139,7 @@ impl Campaign {
         let first_error: Mutex<Option<Error>> = Mutex::new(None);
         let servers = Mutex::new(servers);
         let work = |first: bool| -> Result<()> {
-            let mut worker = Worker::new(scene, specimens)?.with_stop_flag(Arc::clone(&stop));
+            let mut worker = Worker::new(scene, specimens, manifest.first_seed())?.with_stop_flag(Arc::clone(&stop));
             if first {
                 let servers = servers.lock().map(|mut s| std::mem::take(&mut *s)).unwrap_or_default();
                 worker = worker.with_servers(servers);
@@ -199,13 +208,13 @@ impl Store {
         videos::write(self, manifest, &self.records(manifest)?, scene, specimens, progress)
     }
 
-    /// Writes table, report and `result.json` of the stored episodes.
+    /// Writes table, report and `result.json` of the stored episodes, with success shown `by`.
     ///
     /// # Errors
     /// A damaged episode, by its folder; a file that cannot be written.
-    pub fn write_results(&self, manifest: &Manifest) -> Result<CampaignResult> {
+    pub fn write_results(&self, manifest: &Manifest, by: &[By]) -> Result<CampaignResult> {
         let records = self.records(manifest)?;
-        let result = CampaignResult::of(manifest, &records, self.folder());
+        let result = CampaignResult::of(manifest, by, &records, self.folder());
         // All three are made before the first is written, so that they show the same episodes.
         let csv = csv_table(&records)?;
         let page = page::campaign(manifest, &result, &records, self)

@@ -20,7 +20,7 @@ const COLUMNS: [Column; 25] = [
     ("attached", |k| k.summary.attached.to_string()),
     ("grasp_at", |k| or_empty(k.summary.grasp_at)),
     ("held_to_end", |k| k.summary.held_to_end.to_string()),
-    ("lift_mm", |k| k.summary.lift_mm.to_string()),
+    ("lift_mm", |k| or_empty(k.summary.lift_mm)),
     ("slip_mm", |k| or_empty(k.summary.slip_mm)),
     ("rcm_peak_mm", |k| k.summary.rcm_peak_mm.to_string()),
     ("rcm_loaded_median_mm", |k| or_empty(k.loaded_rcm_mm())),
@@ -63,7 +63,7 @@ fn drawn(k: &EpisodeRecord) -> Vec<(String, String)> {
 pub(super) fn csv_table(records: &[EpisodeRecord]) -> Result<String> {
     let format = |e: csv::Error| Error::Format(e.to_string());
     let stages = records.first().map_or(&[][..], |k| &k.summary.progress.stages);
-    let times = stages.iter().map(|s| format!("{}_time_s", s.stage.name()));
+    let times = stages.iter().map(|s| format!("{}_time_s", s.stage));
     let drawn = records.first().map(drawn).unwrap_or_default();
     let names = drawn.iter().map(|(name, _)| format!("drawn.{name}"));
     let mut table = csv::Writer::from_writer(Vec::new());

@@ -18,7 +18,7 @@ use trocar_workflow::{EpisodeOutput, EpisodeRun, Error, Result};
 /// unchanged.
 pub fn run_episode(run: &EpisodeRun, output: &Path, progress: &dyn Progress) -> Result<EpisodeOutput> {
     let spec = PolicySpec::parse(&run.policy)?;
-    manifest::check(std::slice::from_ref(&spec), 1, run.seed, None)?;
+    manifest::check_episode(&spec, run.seed)?;
     if !spec.is_remote() {
         return EpisodeRun { policy: spec.source, ..run.clone() }.run(output, progress);
     }

@@ -6,11 +6,15 @@
 //! the Python package distributes them over several. The bits of an episode depend only on scene,
 //! specimen, policy and seed, and not on the worker or the order.
 
+mod bars;
+mod by;
 mod campaign;
 mod csv_table;
+mod curves;
+mod drawn_result;
 mod episode;
-mod funnel;
 mod manifest;
+mod outcomes;
 mod page;
 mod plots;
 mod policy_server;
@@ -18,15 +22,20 @@ mod policy_spec;
 mod remote;
 mod store;
 mod table;
+mod variation_page;
 mod videos;
 mod worker;
 
-pub use campaign::Campaign;
+pub use by::{By, Value};
+pub use campaign::{Campaign, DEFAULT_VARIATION};
+pub use curves::{Bin, Curve, Share, significant};
+pub use drawn_result::{DrawnEpisode, VariationResult};
 pub use episode::run_episode;
 pub use manifest::{Job, Manifest, named_specimen};
-pub use plots::{lift_and_rcm, lifts};
+pub use outcomes::{distinct_outcomes, repeats};
+pub use plots::{lift_and_rcm, lifts, success_by_name, success_over};
 pub use policy_spec::PolicySpec;
 pub use store::{EpisodeFiles, EpisodeRecord, Store};
-pub use table::{CampaignResult, Comparison, EndCounts, Interval, PolicyRow, StageCount, median};
+pub use table::{CampaignResult, Comparison, EndCounts, Interval, PolicyRow, StageCount, Suspensions, median};
 pub use trocar_workflow::{Error, Result};
 pub use worker::Worker;

@@ -3,7 +3,7 @@
 use crate::policy_spec::PolicySpec;
 use crate::remote;
 use serde::{Deserialize, Serialize};
-use trocar_scene::{Scene, SpecimenSource};
+use trocar_scene::{Scene, SpecimenSource, Split, Variation};
 use trocar_specimen::Specimen;
 use trocar_task::{scene_hash, specimen_hash};
 use trocar_workflow::{Error, Result};
@@ -27,10 +27,10 @@ pub(super) fn program() -> String {
     format!("{} {}", env!("CARGO_PKG_VERSION"), trocar_workflow::EPISODE_SOURCE_HASH)
 }
 
-/// The specimen by whose hash a campaign of `scene` is known: the first one that episodes draw
-/// from. Each episode file knows its own.
-pub fn named_specimen(scene: &Scene) -> SpecimenSource {
-    scene.specimens().into_iter().next().unwrap_or_else(|| scene.specimen.clone())
+/// The specimen by whose hash a campaign of `scene` is known: the first one that episodes of
+/// `split` draw from. Each episode file knows its own.
+pub fn named_specimen(scene: &Scene, split: Split) -> SpecimenSource {
+    split.of_specimens(&scene.specimens()).first().unwrap_or(&scene.specimen).clone()
 }
 
 /// Checks the options of a campaign, without its specimen. `max_episodes` is the value of
@@ -39,10 +39,8 @@ pub fn named_specimen(scene: &Scene) -> SpecimenSource {
 /// # Errors
 /// Names the option and its allowed values.
 pub(super) fn check(policies: &[PolicySpec], episodes: usize, seed: u64, max_episodes: Option<usize>) -> Result<()> {
+    check_policies(policies)?;
     let wrong = |why: String| Err(Error::Mismatch(why));
-    if policies.is_empty() {
-        return wrong("a campaign needs a --policy".to_owned());
-    }
     if !(1..=MAX_EPISODES).contains(&episodes) {
         return wrong(match max_episodes {
             Some(count) => {
@@ -50,6 +48,25 @@ pub(super) fn check(policies: &[PolicySpec], episodes: usize, seed: u64, max_epi
             }
             None => format!("--episodes {episodes}: it must be in [1, {MAX_EPISODES}]"),
         });
+    }
+    let most = Split::FIRST_UNSEEN - episodes as u64;
+    if seed > most {
+        return wrong(format!(
+            "--seed {seed}: it must be at most {most} for {episodes} episodes; --split unseen has the seeds from {}",
+            Split::FIRST_UNSEEN
+        ));
+    }
+    Ok(())
+}
+
+/// Checks the policies of a campaign.
+///
+/// # Errors
+/// No policy, two of one name, an address that is invalid.
+pub(super) fn check_policies(policies: &[PolicySpec]) -> Result<()> {
+    let wrong = |why: String| Err(Error::Mismatch(why));
+    if policies.is_empty() {
+        return wrong("a campaign needs a --policy".to_owned());
     }
     for (k, policy) in policies.iter().enumerate() {
         let name = &policy.name;
@@ -61,13 +78,19 @@ pub(super) fn check(policies: &[PolicySpec], episodes: usize, seed: u64, max_epi
             remote::endpoint(policy)?;
         }
     }
-    let last = seed.checked_add(episodes as u64 - 1);
-    if last.is_none() {
-        return wrong(format!("--seed {seed}: the last of {episodes} seeds would be greater than {}", u64::MAX));
-    }
-    if last.is_some_and(|s| i64::try_from(s).is_err()) && policies.iter().any(PolicySpec::is_remote) {
+    Ok(())
+}
+
+/// Checks the policy and the seed of a single episode.
+///
+/// # Errors
+/// As [`check_policies`]; a seed that servers cannot receive.
+pub(super) fn check_episode(policy: &PolicySpec, seed: u64) -> Result<()> {
+    check_policies(std::slice::from_ref(policy))?;
+    if policy.is_remote() && i64::try_from(seed).is_err() {
         let max = i64::MAX;
-        return wrong(format!("--seed {seed}: seeds for servers and Python policies must be at most {max}"));
+        let why = format!("--seed {seed}: seeds for servers and Python policies must be at most {max}");
+        return Err(Error::Mismatch(why));
     }
     Ok(())
 }
@@ -93,16 +116,25 @@ pub struct Manifest {
     pub policies: Vec<PolicySpec>,
     /// Number of episodes per policy.
     pub episodes: usize,
-    /// Seed of the first episode.
+    /// Which episodes they are.
+    #[serde(default)]
+    pub split: Split,
+    /// Number of the first episode in its split. Of seen episodes it is the seed.
     pub seed: u64,
+    /// What varies between episodes.
+    #[serde(default)]
+    pub variation: Variation,
+    /// Control period of the scene (s).
+    #[serde(default)]
+    pub control_period_s: f64,
     /// Maximum number of episodes of all policies together; `None` for all. Policies take turns, so
     /// the first may have one episode more than the last.
-    #[serde(default, rename = "most")]
+    #[serde(default, alias = "most")]
     pub max_episodes: Option<usize>,
 }
 
 impl Manifest {
-    /// The manifest of `episodes` episodes per policy, whose seeds begin at `seed`.
+    /// The manifest of `episodes` episodes per policy, from number `seed` of `split` on.
     ///
     /// # Errors
     /// No policy, two of one name, an address that is invalid, too many episodes, seeds out of
@@ -112,7 +144,7 @@ impl Manifest {
         specimen: &Specimen,
         policies: &[PolicySpec],
         episodes: usize,
-        seed: u64,
+        (split, seed): (Split, u64),
     ) -> Result<Self> {
         check(policies, episodes, seed, None)?;
         let hash = specimen_hash(specimen);
@@ -125,7 +157,10 @@ impl Manifest {
             rcm_threshold_mm: scene.safety.rcm_threshold_mm,
             policies: policies.to_vec(),
             episodes,
+            split,
             seed,
+            variation: scene.variation.clone(),
+            control_period_s: 1.0 / f64::from(scene.rates.control_hz),
             max_episodes: None,
         })
     }
@@ -136,11 +171,25 @@ impl Manifest {
         self.max_episodes.map_or(all, |max| max.min(all))
     }
 
+    /// The number of the first episode. Both splits begin at the same number.
+    fn first_index(&self) -> u64 {
+        if self.split == Split::Both { 2 * self.seed } else { self.seed }
+    }
+
+    /// The seed of the first episode.
+    pub fn first_seed(&self) -> u64 {
+        self.split.seed(self.first_index())
+    }
+
+    /// The seeds in the order of the episodes.
+    pub fn seeds(&self) -> impl Iterator<Item = u64> + '_ {
+        let first = self.first_index();
+        (0..self.episodes as u64).map(move |index| self.split.seed(first + index))
+    }
+
     /// All jobs. Policies take turns, so that an interrupted campaign can still compare them.
     pub fn jobs(&self) -> impl Iterator<Item = Job> + '_ {
-        let all = (0..self.episodes).flat_map(move |index| {
-            // `check` excludes an overflow.
-            let seed = self.seed.saturating_add(index as u64);
+        let all = self.seeds().enumerate().flat_map(move |(index, seed)| {
             self.policies.iter().map(move |policy| Job { policy: policy.clone(), index, seed })
         });
         all.take(self.count())
@@ -164,7 +213,10 @@ mod tests {
             rcm_threshold_mm: 3.0,
             policies,
             episodes: 24,
+            split: Split::Seen,
             seed: 7,
+            variation: Variation::default(),
+            control_period_s: 1.0 / 30.0,
             max_episodes: None,
         };
         assert_eq!((manifest.count(), manifest.jobs().count()), (144, 144));
@@ -173,6 +225,14 @@ mod tests {
         let of = |name: &str| jobs.iter().filter(|j| j.policy.name == name).count();
         assert_eq!(POLICIES.map(of), [24, 24, 23, 23, 23, 23]);
         assert!(jobs.iter().all(|j| j.seed == 7 + j.index as u64));
+        let seeds = |split| Manifest { split, ..manifest.clone() }.seeds().take(4).collect::<Vec<_>>();
+        assert_eq!(seeds(Split::Unseen), [1_000_007, 1_000_008, 1_000_009, 1_000_010]);
+        assert_eq!(seeds(Split::Both), [7, 1_000_007, 8, 1_000_008]);
+        // An earlier name of a key is read.
+        let text = serde_json::to_string(&manifest).unwrap();
+        assert!(text.contains("\"max_episodes\":140"), "{text}");
+        let older: Manifest = serde_json::from_str(&text.replace("max_episodes", "most")).unwrap();
+        assert_eq!(older, manifest);
     }
 
     #[test]
@@ -182,13 +242,15 @@ mod tests {
         let said = |policies: &[PolicySpec], episodes, seed, most| {
             check(policies, episodes, seed, most).map_err(|e| e.to_string()).err().unwrap_or_default()
         };
-        assert_eq!(said(&scripted, 2, u64::MAX - 1, None), "");
-        assert_eq!(said(&server, 2, i64::MAX as u64 - 1, None), "");
+        assert_eq!(said(&scripted, 2, Split::FIRST_UNSEEN - 2, None), "");
+        assert_eq!(check_episode(&server[0], i64::MAX as u64).map_err(|e| e.to_string()), Ok(()));
         assert!(said(&scripted, 0, 0, None).starts_with("--episodes 0"));
         // The option that the user wrote is named.
         assert!(said(&scripted, 900_000, 0, Some(900_000)).starts_with("--rollouts 900000: "));
+        assert!(said(&scripted, 2, Split::FIRST_UNSEEN - 1, None).starts_with("--seed 999999: "));
         assert!(said(&scripted, 2, u64::MAX, None).starts_with("--seed 18446744073709551615: "));
-        assert!(said(&server, 2, i64::MAX as u64, None).starts_with("--seed 9223372036854775807: "));
+        let why = check_episode(&server[0], i64::MAX as u64 + 1).unwrap_err().to_string();
+        assert!(why.starts_with("--seed 9223372036854775808: "), "{why}");
         assert!(said(&[&scripted[..], &scripted].concat(), 1, 0, None).contains("two policies"));
         assert!(said(&[], 1, 0, None).contains("--policy"));
         let made_by_hand = PolicySpec { name: "a".to_owned(), source: "ws://".to_owned() };

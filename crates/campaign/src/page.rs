@@ -1,11 +1,13 @@
 //! The page of a campaign: outcome, failures, policies, stages, distributions, gates and pairs of
 //! policies.
 
-use crate::funnel;
+use crate::bars;
 use crate::manifest::Manifest;
+use crate::outcomes::repeats;
 use crate::plots;
 use crate::store::{EpisodeRecord, Store};
 use crate::table::{CampaignResult, Interval, PolicyRow};
+use crate::variation_page;
 use crate::videos;
 use trocar_report::figures;
 use trocar_report::page::{self, Card, Columns};
@@ -32,7 +34,13 @@ pub(crate) fn campaign(
         1 => "; in one the policy failed, and --retry-failed runs it again".to_owned(),
         n => format!("; in {n} the policy failed, and --retry-failed runs them again"),
     };
-    let subtitle = format!("Campaign of {}, seeds from {}{again}", counted(result.episodes, "episode"), manifest.seed);
+    let subtitle = format!(
+        "Campaign of {}, split {}, from number {}, variation {}{again}",
+        counted(result.episodes, "episode"),
+        manifest.split.name(),
+        manifest.seed,
+        manifest.variation.set.name()
+    );
     Ok(page::page(&title, &subtitle, &body(manifest, result, records, store)?))
 }
 
@@ -49,13 +57,17 @@ fn body(manifest: &Manifest, r: &CampaignResult, records: &[EpisodeRecord], stor
         r.policies.iter().map(|p| page::escape(&p.policy)).collect::<Vec<_>>().join(", "),
         if r.policies.len() > 1 { "All policies have the same seeds. " } else { "" }
     );
-    let overview = page::section("Outcome", &lead, &cards(manifest, r));
+    let warning =
+        repeats(r.distinct_outcomes, r.episodes).map_or_else(String::new, |why| page::warning(&sentence(&why)));
+    let overview = page::section("Outcome", &lead, &(warning + &cards(manifest, r)));
+    let varied = variation_page::varied(manifest, r, records);
+    let curves = variation_page::curves(r)?;
     let policies = page::section("Policies", "", &outcome(r));
     let stages = page::section(
         "Stages",
         "Stages pass in order. Each counts the episodes that passed it and all stages before it.",
         &(page::figure(
-            &funnel::funnel(r),
+            &bars::stages(r),
             "<b>Passed stages.</b> Filled: share of episodes that passed. Whiskers: 95% intervals.",
         ) + &stage_table(r)),
     );
@@ -69,10 +81,30 @@ fn body(manifest: &Manifest, r: &CampaignResult, records: &[EpisodeRecord], stor
         "Stored channels scored at other gates, without simulation. An episode ends when it passes the scene\u{2019}s gates, so a stricter gate may miss what would have followed.",
         &page::grid(Columns::Two, &plots::sweeps(manifest, records, store)?),
     );
-    Ok(overview + &failed + &successes(manifest, records, store) + &policies + &stages + &spread + &gates + &pairs(r))
+    let episodes = variation_page::episodes(records);
+    Ok([
+        overview,
+        varied,
+        curves,
+        failed,
+        successes(manifest, records, store),
+        policies,
+        stages,
+        spread,
+        gates,
+        pairs(r),
+        episodes,
+    ]
+    .concat())
 }
 
-fn share(i: &Interval) -> String {
+/// A sentence from words.
+fn sentence(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or_else(String::new, |first| format!("{}{}.", first.to_uppercase(), letters.as_str()))
+}
+
+pub(super) fn share(i: &Interval) -> String {
     format!("{} ({}\u{2013}{})", percent(i.share, 0), percent(i.low, 0), percent(i.high, 0))
 }
 
@@ -101,13 +133,18 @@ fn cards(manifest: &Manifest, r: &CampaignResult) -> String {
             format!("largest deviation at most {} mm, of the episodes with a grasp", manifest.rcm_threshold_mm),
         ));
     }
+    let note = "differ from each other by more than 0.01 mm, 0.001 N or one control period";
+    let distinct = Card::new("Distinct outcomes", format!("{} of {}", r.distinct_outcomes, r.episodes), note);
+    all.push(distinct.met(r.distinct_outcomes == r.episodes));
     let inverted = r.policies.iter().map(|p| p.inverted_peak).max().unwrap_or(0);
     let diverged: usize = r.policies.iter().map(|p| p.ends.diverged).sum();
     all.push(Card::new("Inverted elements", inverted.to_string(), "maximum of any frame").met(inverted == 0));
     all.push(Card::new("Diverged", diverged.to_string(), "episodes").met(diverged == 0));
-    let suspended: usize = r.policies.iter().map(|p| p.disabled_contacts + p.disabled_blades + p.relaxed).sum();
-    let note = "of physics by safety rules: contacts disabled, contacts of blades disabled, organs relaxed";
-    all.push(Card::new("Suspensions", suspended.to_string(), note).met(suspended == 0));
+    let s = &r.suspensions;
+    let counts = [s.disabled_contacts, s.disabled_blades, s.relaxed];
+    let note = "of physics by safety rules: contacts disabled / contacts of blades disabled / organs relaxed";
+    let said = counts.map(|n| n.to_string()).join("/");
+    all.push(Card::new("Suspensions", said, note).met(counts == [0; 3]));
     page::cards(&all)
 }
 
@@ -115,6 +152,7 @@ fn outcome(r: &CampaignResult) -> String {
     let head = [
         "policy",
         "episodes",
+        "distinct",
         "passed",
         "mean score",
         "not passed in time",
@@ -136,9 +174,10 @@ fn outcome(r: &CampaignResult) -> String {
         vec![
             p.policy.clone(),
             p.episodes.to_string(),
+            p.distinct_outcomes.to_string(),
             format!("{}, {}", p.passed, share(&p.interval)),
             fixed(p.mean_score, 2),
-            (p.ends.time_out + p.ends.finished).to_string(),
+            (p.ends.time_out + p.ends.finished + p.ends.aborted).to_string(),
             p.ends.rcm_abort.to_string(),
             p.ends.diverged.to_string(),
             p.ends.policy_error.to_string(),
@@ -213,7 +252,7 @@ fn video(store: &Store, k: &EpisodeRecord, caption: &str) -> Option<String> {
     Some(page::figure(&img, &format!("<b>{}</b> {}", page::escape(&name), page::escape(caption))))
 }
 
-fn why(k: &EpisodeRecord) -> String {
+pub(super) fn why(k: &EpisodeRecord) -> String {
     let end = || k.summary.end.as_ref().map_or("no end".to_owned(), ToString::to_string);
     k.summary.why.clone().unwrap_or_else(end)
 }
@@ -221,7 +260,8 @@ fn why(k: &EpisodeRecord) -> String {
 /// Median times at which the stages passed.
 fn stage_table(r: &CampaignResult) -> String {
     let Some(first) = r.policies.first() else { return String::new() };
-    let head: Vec<&str> = ["median time (s)"].into_iter().chain(first.stages.iter().map(|s| s.stage)).collect();
+    let head: Vec<&str> =
+        ["median time (s)"].into_iter().chain(first.stages.iter().map(|s| s.stage.as_str())).collect();
     let row = |p: &PolicyRow| {
         let times = p.stages.iter().map(|s| or_dash(s.median_s, 2));
         [p.policy.clone()].into_iter().chain(times).collect()

@@ -1,8 +1,11 @@
 //! The plots of a campaign's page: distributions over episodes, and sweeps over gates.
 
+use crate::bars;
+use crate::curves::Curve;
 use crate::manifest::Manifest;
 use crate::policy_spec::PolicySpec;
 use crate::store::{EpisodeRecord, Store};
+use crate::table::Interval;
 use trocar_report::colors;
 use trocar_report::page;
 use trocar_report::plots::{Line, Plot};
@@ -13,6 +16,8 @@ use trocar_workflow::Result;
 const MAX_SWEPT: usize = 60;
 /// Half the size of a mark, as a share of the plot.
 const MARK_SIZE: f64 = 0.012;
+/// Distance between the marks of two policies, as a share of the plot.
+const BESIDE: f64 = 0.015;
 /// RCM deviation at which the hardware stops (mm).
 const ABORT_MM: f64 = 5.0;
 
@@ -40,11 +45,12 @@ pub fn lift_and_rcm(manifest: &Manifest, records: &[EpisodeRecord]) -> Result<St
     let max = |of: &dyn Fn(&EpisodeRecord) -> f64| attached.iter().map(|k| of(k)).fold(1e-3, f64::max);
     let height = max(&|k| k.summary.rcm_peak_mm);
     // The x axis begins at the smallest value and the y axis at zero, so that marks look square.
-    let min = attached.iter().map(|k| k.summary.lift_mm).fold(f64::INFINITY, f64::min);
-    let width = (max(&|k| k.summary.lift_mm) - min).max(1.0);
+    let lift = |k: &EpisodeRecord| k.summary.lift_mm.unwrap_or(0.0);
+    let min = attached.iter().map(|k| lift(k)).fold(f64::INFINITY, f64::min);
+    let width = (max(&lift) - min).max(1.0);
     let mut lines = Vec::new();
     for k in &attached {
-        let (x, y, color) = (k.summary.lift_mm, k.summary.rcm_peak_mm, color(manifest, &k.name));
+        let (x, y, color) = (lift(k), k.summary.rcm_peak_mm, color(manifest, &k.name));
         let (a, b) = (MARK_SIZE * width, 2.0 * MARK_SIZE * height);
         lines.push(Line { points: vec![(x - a, y), (x + a, y)], color, filled: false });
         lines.push(Line { points: vec![(x, y - b), (x, y + b)], color, filled: false });
@@ -69,8 +75,7 @@ pub fn lift_and_rcm(manifest: &Manifest, records: &[EpisodeRecord]) -> Result<St
 /// # Errors
 /// A plot that cannot be drawn.
 pub fn lifts(manifest: &Manifest, records: &[EpisodeRecord]) -> Result<String> {
-    let lift = |k: &EpisodeRecord| k.summary.attached.then_some(k.summary.lift_mm);
-    distribution(manifest, records, "Lift", "greatest lift of held tissue (mm)", &lift)
+    distribution(manifest, records, "Lift", "greatest lift of held tissue (mm)", &|k| k.summary.lift_mm)
 }
 
 /// The distributions of the page.
@@ -82,7 +87,7 @@ pub(super) fn distributions(manifest: &Manifest, records: &[EpisodeRecord]) -> R
         ("Constraint force", "peak pull of held tissue (N)", |k| Some(k.peak(|a| a.peak_constraint_n))),
         ("Jaw force", "peak force of tissue on the blades of a jaw (N)", |k| Some(k.peak(|a| a.peak_jaw_n))),
         ("Tracking lag", "delay of the measured tip behind the commanded tip (ms)", EpisodeRecord::lag_ms),
-        ("Lift", "greatest lift of held tissue (mm)", |k| Some(k.summary.lift_mm)),
+        ("Lift", "greatest lift of held tissue (mm)", |k| k.summary.lift_mm),
     ];
     let mut figures = vec![lift_and_rcm(manifest, records)?];
     for (name, x, of) in all {
@@ -108,6 +113,49 @@ fn distribution(
     };
     let lines = manifest.policies.iter().map(line).collect();
     figure(manifest, &share_plot(name, x, "share of episodes", lines), &format!("<b>{name}.</b>"))
+}
+
+/// The share of episodes that passed for each name of `curve`, with intervals.
+pub fn success_by_name(curve: &Curve) -> String {
+    let name = page::escape(&curve.name);
+    page::figure(&bars::values(curve), &format!("<b>Success by {name}.</b> Whiskers: 95% intervals."))
+}
+
+/// The share of episodes of `policies` that passed over the numbers of `curve`, with intervals.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub fn success_over(policies: &[&str], curve: &Curve) -> Result<String> {
+    let numbers: Vec<[f64; 3]> = curve.bins.iter().filter_map(|bin| bin.numbers).collect();
+    let scale = |x: f64| if curve.log { x.ln() } else { x };
+    let unscale = |x: f64| if curve.log { x.exp() } else { x };
+    let (low, high) = (numbers.first().map_or(0.0, |n| scale(n[0])), numbers.last().map_or(1.0, |n| scale(n[2])));
+    let (width, count) = (high - low, policies.len());
+    let mut lines = Vec::new();
+    for k in 0..count {
+        let color = colors::organ(k);
+        // Policies stand beside each other, so that their whiskers can be told apart.
+        let aside = BESIDE * width * (k as f64 - 0.5 * (count as f64 - 1.0));
+        let shares = curve.bins.iter().filter_map(|bin| Some((bin.numbers?[1], bin.policies.get(k)?)));
+        let points: Vec<(f64, &Interval)> = shares
+            .filter(|(_, share)| share.episodes > 0)
+            .map(|(x, share)| (scale(x) + aside, &share.interval))
+            .collect();
+        lines.push(Line::new(points.iter().map(|(x, i)| (unscale(*x), i.share)).collect(), color));
+        for (x, i) in points {
+            let cap = 0.5 * MARK_SIZE * width;
+            lines.push(Line::new(vec![(unscale(x), i.low), (unscale(x), i.high)], color));
+            for end in [i.low, i.high] {
+                lines.push(Line::new(vec![(unscale(x - cap), end), (unscale(x + cap), end)], color));
+            }
+            let mark = vec![(unscale(x - MARK_SIZE * width), i.share), (unscale(x + MARK_SIZE * width), i.share)];
+            lines.push(Line::new(mark, color));
+        }
+    }
+    let title = format!("Success by {}", curve.name);
+    let plot = Plot { log_x: curve.log, ..share_plot(&title, &curve.label, "share of episodes that passed", lines) };
+    let legend = page::legend(policies.iter().enumerate().map(|(k, name)| (*name, colors::organ(k))));
+    Ok(page::figure(&plot.svg()?, &format!("<b>{}.</b>{legend}", page::escape(&title))))
 }
 
 /// The gates that are swept for a task: the range, and the label of its axis.

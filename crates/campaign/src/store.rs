@@ -5,6 +5,7 @@ use crate::policy_spec::PolicySpec;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
+use trocar_scene::{Split, Variation};
 use trocar_task::{ArmSummary, CHANNELS_FILE, EPISODE_FILE, End, RESULT_FILE, Recording, Summary, read_channels};
 use trocar_workflow::{Error, Result};
 
@@ -126,15 +127,26 @@ fn read_manifest(folder: &Path) -> Result<Option<Manifest>> {
     Ok(None)
 }
 
-/// Checks that `folder` can hold a campaign of `policies` whose seeds begin at `seed`, without its
-/// specimen.
+/// Checks that `folder` can hold a campaign of `policies` that begins at `seed` of `split` and
+/// varies by `variation`, without its specimen.
 ///
 /// # Errors
 /// As [`Store::open`].
-pub(super) fn check_compatible(folder: &Path, policies: &[PolicySpec], seed: u64) -> Result<()> {
+pub(super) fn check_compatible(
+    folder: &Path,
+    policies: &[PolicySpec],
+    (split, seed): (Split, u64),
+    variation: &Variation,
+) -> Result<()> {
     let Some(old) = read_manifest(folder)? else { return Ok(()) };
     let exists = |reason: String| Err(Error::Exists { path: folder.to_owned(), reason });
-    let other = [("seed", old.seed != seed), ("program", old.program != manifest::program())];
+    // Files of earlier programs lack what is compared next.
+    let other = [
+        ("program", old.program != manifest::program()),
+        ("seed", old.seed != seed),
+        ("split", old.split != split),
+        ("variation", old.variation != *variation),
+    ];
     if let Some((what, _)) = other.iter().find(|(_, differs)| *differs) {
         return exists(format!("is a campaign of another {what}; choose another folder"));
     }
@@ -153,7 +165,7 @@ pub(super) fn has_episodes(folder: &Path, name: &str, count: usize) -> bool {
 
 impl Store {
     /// Opens or creates the campaign in `folder`. An existing campaign may get more episodes and
-    /// other policies, but not another scene, specimen or seed.
+    /// other policies, but not another scene, specimen, variation, split or seed.
     ///
     /// # Errors
     /// A folder with other contents or another campaign; one that another process writes.
@@ -172,6 +184,7 @@ impl Store {
         let mut whole = manifest.clone();
         whole.policies = manifest.policies.iter().map(PolicySpec::redacted).collect();
         if let Some(old) = read_manifest(folder)? {
+            check_compatible(folder, &manifest.policies, (manifest.split, manifest.seed), &manifest.variation)?;
             let other = [
                 ("scene", old.scene_hash != manifest.scene_hash),
                 ("specimen", old.specimen_hash != manifest.specimen_hash),
@@ -179,7 +192,6 @@ impl Store {
             if let Some((what, _)) = other.iter().find(|(_, differs)| *differs) {
                 return Err(exists(format!("is a campaign of another {what}; choose another folder")));
             }
-            check_compatible(folder, &manifest.policies, manifest.seed)?;
             // Stored episodes of policies that are not part of this run stay valid.
             let others = old.policies.into_iter().filter(|o| manifest.policies.iter().all(|p| p.name != o.name));
             whole.policies.extend(others);

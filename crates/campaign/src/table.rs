@@ -1,7 +1,11 @@
 //! The figures of a campaign: episodes of each policy that passed each stage, with intervals, and
 //! comparisons of policies on the same seeds.
 
+use crate::by::By;
+use crate::curves::Curve;
+use crate::drawn_result::VariationResult;
 use crate::manifest::Manifest;
+use crate::outcomes::distinct_outcomes;
 use crate::store::EpisodeRecord;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -43,7 +47,7 @@ impl Interval {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StageCount {
     /// The stage.
-    pub stage: &'static str,
+    pub stage: String,
     /// Episodes that passed it.
     pub passed: usize,
     /// Their share.
@@ -66,8 +70,16 @@ pub struct EndCounts {
     pub diverged: usize,
     /// The policy failed.
     pub policy_error: usize,
+    /// What the task names as an abort came to be.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub aborted: usize,
     /// The policy had nothing left to do before all stages passed.
     pub finished: usize,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 impl EndCounts {
@@ -81,6 +93,7 @@ impl EndCounts {
                 Some(End::RcmAbort { .. }) => &mut counts.rcm_abort,
                 Some(End::Diverged { .. }) => &mut counts.diverged,
                 Some(End::PolicyError { .. }) => &mut counts.policy_error,
+                Some(End::Aborted { .. }) => &mut counts.aborted,
                 Some(End::Finished) => &mut counts.finished,
             } += 1;
         }
@@ -95,6 +108,8 @@ pub struct PolicyRow {
     pub policy: String,
     /// Stored episodes.
     pub episodes: usize,
+    /// Episodes that differ from each other in any figure by more than can be measured.
+    pub distinct_outcomes: usize,
     /// Episodes that passed all stages.
     pub passed: usize,
     /// Their share.
@@ -160,6 +175,17 @@ pub struct Comparison {
     pub score_difference: f64,
 }
 
+/// Suspensions of physics in all episodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Suspensions {
+    /// Number of times that contact of an instrument was disabled.
+    pub disabled_contacts: usize,
+    /// Number of times that contact of blades that hold tissue was disabled.
+    pub disabled_blades: usize,
+    /// Number of times that an organ was relaxed outside of time.
+    pub relaxed: usize,
+}
+
 /// The figures of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CampaignResult {
@@ -167,7 +193,7 @@ pub struct CampaignResult {
     pub scene: String,
     /// The task.
     pub task: String,
-    /// Seed of the first episode.
+    /// Number of the first episode in its split. Of seen episodes it is the seed.
     pub seed: u64,
     /// Stored episodes.
     pub episodes: usize,
@@ -175,6 +201,15 @@ pub struct CampaignResult {
     pub planned: usize,
     /// Episodes of all policies that passed.
     pub passed: usize,
+    /// Sum over the policies of the episodes that differ from each other in any figure by more than
+    /// can be measured: 0.01 mm, 0.001 N or one control period.
+    pub distinct_outcomes: usize,
+    /// Suspensions of physics.
+    pub suspensions: Suspensions,
+    /// What varied, and what was drawn.
+    pub variation: VariationResult,
+    /// Success over what varied.
+    pub by: Vec<Curve>,
     /// The policies in order.
     pub policies: Vec<PolicyRow>,
     /// The pairs of policies.
@@ -194,13 +229,15 @@ impl PolicyRow {
 
 impl CampaignResult {
     /// The figures of the stored episodes `records`.
-    pub(super) fn of(manifest: &Manifest, records: &[EpisodeRecord], folder: &Path) -> Self {
+    pub(super) fn of(manifest: &Manifest, by: &[By], records: &[EpisodeRecord], folder: &Path) -> Self {
         let of = |name: &str| records.iter().filter(|k| k.name == name).collect::<Vec<_>>();
         // A policy without episodes has the stages of the others.
-        let stages: Vec<&'static str> = records
+        let stages: Vec<&str> = records
             .first()
-            .map_or_else(Vec::new, |k| k.summary.progress.stages.iter().map(|s| s.stage.name()).collect());
-        let policies = manifest.policies.iter().map(|p| row(&p.name, &of(&p.name), &stages, manifest)).collect();
+            .map_or_else(Vec::new, |k| k.summary.progress.stages.iter().map(|s| s.stage.as_str()).collect());
+        let policies: Vec<PolicyRow> =
+            manifest.policies.iter().map(|p| row(&p.name, &of(&p.name), &stages, manifest)).collect();
+        let names: Vec<&str> = manifest.policies.iter().map(|p| p.name.as_str()).collect();
         let mut comparisons = Vec::new();
         for (k, a) in manifest.policies.iter().enumerate() {
             for b in &manifest.policies[k + 1..] {
@@ -219,6 +256,14 @@ impl CampaignResult {
             episodes: records.len(),
             planned: manifest.count(),
             passed: records.iter().filter(|k| k.summary.passed).count(),
+            distinct_outcomes: policies.iter().map(|p| p.distinct_outcomes).sum(),
+            suspensions: Suspensions {
+                disabled_contacts: policies.iter().map(|p| p.disabled_contacts).sum(),
+                disabled_blades: policies.iter().map(|p| p.disabled_blades).sum(),
+                relaxed: policies.iter().map(|p| p.relaxed).sum(),
+            },
+            variation: VariationResult::of(manifest, records),
+            by: by.iter().map(|by| Curve::of(by, &names, records)).collect(),
             policies,
             comparisons,
             hash: format!("{:016x}", hash.digest()),
@@ -227,12 +272,17 @@ impl CampaignResult {
     }
 }
 
-fn row(name: &str, records: &[&EpisodeRecord], names: &[&'static str], manifest: &Manifest) -> PolicyRow {
+fn row(name: &str, records: &[&EpisodeRecord], names: &[&str], manifest: &Manifest) -> PolicyRow {
     let all = records.len();
     let stages = names.iter().enumerate().map(|(n, stage)| {
         let times: Vec<f64> = records.iter().filter_map(|k| k.summary.progress.stages.get(n)?.time_s).collect();
         let passed = records.iter().filter(|k| k.summary.progress.stages.get(n).is_some_and(|s| s.passed)).count();
-        StageCount { stage, passed, interval: Interval::wilson(passed, all), median_s: median(times) }
+        StageCount {
+            stage: (*stage).to_owned(),
+            passed,
+            interval: Interval::wilson(passed, all),
+            median_s: median(times),
+        }
     });
     let passed = records.iter().filter(|k| k.summary.passed).count();
     let attached: Vec<&&EpisodeRecord> = records.iter().filter(|k| k.summary.attached).collect();
@@ -246,6 +296,7 @@ fn row(name: &str, records: &[&EpisodeRecord], names: &[&'static str], manifest:
     PolicyRow {
         policy: name.to_owned(),
         episodes: all,
+        distinct_outcomes: distinct_outcomes(records, manifest.control_period_s),
         passed,
         interval: Interval::wilson(passed, all),
         stages: stages.collect(),
@@ -253,7 +304,7 @@ fn row(name: &str, records: &[&EpisodeRecord], names: &[&'static str], manifest:
         ends,
         attached: attached.len(),
         held_to_end: attached.iter().filter(|k| k.summary.held_to_end).count(),
-        lift_median_mm: median(attached.iter().map(|k| k.summary.lift_mm).collect()),
+        lift_median_mm: median(attached.iter().filter_map(|k| k.summary.lift_mm).collect()),
         rcm_median_mm: median(attached.iter().filter_map(|k| k.loaded_rcm_mm()).collect()),
         rcm_max_mm: records.iter().map(|k| k.summary.rcm_peak_mm).max_by(f64::total_cmp),
         rcm_within: attached.iter().filter(|k| k.summary.rcm_peak_mm <= manifest.rcm_threshold_mm).count(),
@@ -349,6 +400,7 @@ mod tests {
             End::RcmAbort { arm: why(), deviation_mm: 6.0 },
             End::Diverged { why: why() },
             End::PolicyError { why: why() },
+            End::Aborted { name: why() },
             End::Finished,
         ];
         let json = serde_json::to_value(EndCounts::of(ends.iter().map(Some))).unwrap();

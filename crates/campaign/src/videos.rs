@@ -70,7 +70,8 @@ pub(super) fn write(
     if chosen.is_empty() || !scene.cameras.iter().any(|c| c.name == "endoscope") {
         return Ok(());
     }
-    let mut episode = Episode::with_specimens(scene, Box::new(specimens.clone()), 0)?;
+    let seed = manifest.first_seed();
+    let mut episode = Episode::begun(scene, Box::new(specimens.clone()), 0, seed, scene.draw(seed))?;
     progress.begin("pictures", chosen.len() as u64);
     for record in chosen {
         let path = store.episode(&record.name, record.index).join(EPISODE_FILE);

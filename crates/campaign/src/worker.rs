@@ -26,12 +26,13 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Builds the cell of `scene`, whose episodes have `specimens`, stepped by one thread.
+    /// Builds the cell of `scene`, whose episodes have `specimens`, stepped by one thread. It stands
+    /// at the start of the episode of `seed`.
     ///
     /// # Errors
     /// A scene that cannot be built.
-    pub fn new(scene: &Scene, specimens: &SpecimenCache) -> Result<Self> {
-        let episode = Episode::with_specimens(scene, Box::new(specimens.clone()), 1)?;
+    pub fn new(scene: &Scene, specimens: &SpecimenCache, seed: u64) -> Result<Self> {
+        let episode = Episode::begun(scene, Box::new(specimens.clone()), 1, seed, scene.draw(seed))?;
         Ok(Self { episode, policies: BTreeMap::new(), stop: Arc::default(), python: None, servers: BTreeMap::new() })
     }
 

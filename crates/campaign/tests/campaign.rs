@@ -10,7 +10,7 @@ use tempfile::TempDir;
 use trocar_campaign::{Campaign, EpisodeFiles, Job, Manifest, PolicySpec, Store, run_episode};
 use trocar_core::{Silent, StopAfter};
 use trocar_remote::{Array, Call, Dialect, Loopback, LoopbackOptions, Map, Value};
-use trocar_scene::{Distribution, Factor, Scene, SpecimenSource, Specimens, TaskName};
+use trocar_scene::{Distribution, Factor, Scene, SpecimenSource, Specimens, Split, TaskName, VariationSet};
 use trocar_task::EpisodeFile;
 use trocar_testing::tube;
 use trocar_workflow::EpisodeRun;
@@ -34,8 +34,10 @@ fn campaign(folder: &Path, policies: &[&str], episodes: usize) -> Campaign {
         scene: folder.join("reach.toml").display().to_string(),
         policies: policies.iter().map(|p| PolicySpec::parse(p).unwrap()).collect(),
         episodes,
+        split: Split::Seen,
         seed: 0,
-        variation: None,
+        variation: Some(VariationSet::None),
+        by: Vec::new(),
         jobs: 1,
         retry_failed: false,
         phantoms: folder.join("phantoms"),
@@ -48,7 +50,7 @@ fn episodes_of_names_with_dots_are_done_again_side_by_side() {
     let scene = trocar_scene::Scene::read(&scene(dir.path()).display().to_string()).unwrap();
     let specimen = tube::two_tubes(tube::ONE_END, 4e-3);
     let policies = ["v1.0=random", "v1.1=random"].map(|p| PolicySpec::parse(p).unwrap());
-    let manifest = Manifest::new(&scene, &specimen, &policies, 40, 0).unwrap();
+    let manifest = Manifest::new(&scene, &specimen, &policies, 40, (Split::Seen, 0)).unwrap();
     let store = Store::open(&dir.path().join("campaign"), &manifest).unwrap();
     let jobs: Vec<Job> = manifest.jobs().collect();
     let next = AtomicUsize::new(0);
@@ -368,7 +370,7 @@ fn episodes_have_the_specimens_that_are_drawn_for_them() {
     varied.variation.factors.insert(Factor::Modulus, Distribution::LogUniform([6.0, 24.0]));
     std::fs::write(&file, varied.to_toml().unwrap()).unwrap();
     let run = |name: &str, jobs: usize| {
-        let campaign = Campaign { jobs, ..campaign(dir.path(), &["random"], 6) };
+        let campaign = Campaign { jobs, split: Split::Both, ..campaign(dir.path(), &["random"], 6) };
         campaign.run(&dir.path().join(name), &Silent).unwrap().hash
     };
     assert_eq!(run("one", 1), run("two", 2));
@@ -377,16 +379,94 @@ fn episodes_have_the_specimens_that_are_drawn_for_them() {
     let head = lines.next().unwrap();
     let at = |name: &str| head.iter().position(|h| h == name).unwrap();
     let (specimen, modulus, tilt) = (at("drawn.specimen"), at("drawn.modulus_kpa"), at("drawn.left.tilt_deg"));
-    for (seed, row) in lines.enumerate() {
-        let drawn = varied.draw(seed as u64);
+    for (index, row) in lines.enumerate() {
+        let drawn = varied.draw(Split::Both.seed(index as u64));
         assert_eq!(row[specimen], drawn.specimen.label());
         for (column, name) in [(modulus, "modulus_kpa"), (tilt, "left.tilt_deg")] {
             let value = drawn.values.iter().find(|v| v.name() == name).unwrap().value;
             assert_eq!(row[column].parse::<f64>().unwrap(), value);
         }
     }
-    let seen: std::collections::BTreeSet<String> = (0..6).map(|seed| varied.draw(seed).specimen.label()).collect();
-    assert_eq!(seen.len(), 2);
+    let seen: std::collections::BTreeSet<String> =
+        (0..6).map(|k| varied.draw(Split::Both.seed(k)).specimen.label()).collect();
+    assert_eq!(seen.len(), 2, "the seen specimen and the unseen one");
     // Videos are replays: each has its own specimen.
     assert!(std::fs::read_dir(dir.path().join("two/pictures")).unwrap().count() > 2);
+}
+
+#[test]
+fn a_campaign_varies_unless_it_is_told_otherwise_and_shows_success_by_what_varied() {
+    let dir = TempDir::new().unwrap();
+    scene(dir.path());
+    let folder = dir.path().join("campaign");
+    let varied =
+        || Campaign { split: Split::Both, variation: None, ..campaign(dir.path(), &["random", "scripted"], 8) };
+    // It stops on the way and goes on with the same bits.
+    let stopped = varied().run(&folder, &StopAfter::new(5)).unwrap_err().to_string();
+    assert!(stopped.contains("continues"), "{stopped}");
+    let result = varied().run(&folder, &Silent).unwrap();
+    let whole = Campaign { jobs: 3, ..varied() }.run(&dir.path().join("whole"), &Silent).unwrap();
+    assert_eq!((result.episodes, &result.hash, &result.by), (16, &whole.hash, &whole.by));
+    assert_eq!((result.variation.name, result.variation.episodes.len()), ("standard", 8));
+    assert_eq!(result.variation.episodes[7].seed, Split::FIRST_UNSEEN + 3);
+    assert!(result.distinct_outcomes > 12, "{}", result.distinct_outcomes);
+    let names: Vec<&str> = result.by.iter().map(|curve| curve.name.as_str()).collect();
+    assert_eq!(names[..3], ["split", "specimen_shift_mm", "specimen_turn_deg"]);
+    for curve in &result.by {
+        for (k, row) in result.policies.iter().enumerate() {
+            let shares = || curve.bins.iter().map(|bin| &bin.policies[k]);
+            assert_eq!(shares().map(|s| s.episodes).sum::<usize>(), row.episodes, "{}", curve.name);
+            assert_eq!(shares().map(|s| s.passed).sum::<usize>(), row.passed, "{}", curve.name);
+        }
+    }
+    let modulus = result.by.iter().find(|curve| curve.name == "modulus_kpa").unwrap();
+    assert_eq!((modulus.label.as_str(), modulus.log, modulus.bins.len()), ("modulus (kPa)", true, 2));
+    let [low, middle, high] = modulus.bins[0].numbers.unwrap();
+    assert!(3.0 <= low && low <= middle && middle <= high && high < modulus.bins[1].numbers.unwrap()[0]);
+    let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
+    for said in
+        ["The set standard varies", "Success by split", "<details><summary>16 episodes", "1000003", "modulus (kPa)"]
+    {
+        assert!(page.contains(said), "{said}");
+    }
+    // Only what is asked for.
+    let modulus = Campaign { by: vec!["modulus".to_owned()], ..varied() }.run(&folder, &Silent).unwrap();
+    assert_eq!((modulus.by.len(), modulus.hash), (1, result.hash));
+    // Episodes of another kind are refused, and names before anything is made.
+    for (other, said) in [
+        (Campaign { split: Split::Seen, ..varied() }, "another split"),
+        (Campaign { variation: Some(VariationSet::Easy), ..varied() }, "another variation"),
+        (Campaign { by: vec!["modulous".to_owned()], ..varied() }, "did you mean 'modulus'?"),
+    ] {
+        let why = other.run(&folder, &Silent).unwrap_err().to_string();
+        assert!(why.contains(said), "{why}");
+    }
+}
+
+#[test]
+fn episodes_that_repeat_others_are_counted_and_told() {
+    let dir = TempDir::new().unwrap();
+    let file = scene(dir.path());
+    let mut fixed = Scene::read(&file.display().to_string()).unwrap();
+    fixed.variation = trocar_scene::Variation::default();
+    // The places of port-reach are drawn by the seed.
+    fixed.task.name = TaskName::GraspLift;
+    std::fs::write(&file, fixed.to_toml().unwrap()).unwrap();
+    let folder = dir.path().join("campaign");
+    // The scripted controller knows no seed, the random one does.
+    let result = campaign(dir.path(), &["scripted", "random"], 4).run(&folder, &Silent).unwrap();
+    let distinct: Vec<usize> = result.policies.iter().map(|p| p.distinct_outcomes).collect();
+    assert_eq!((distinct[0], result.distinct_outcomes), (1, distinct.iter().sum()), "{distinct:?}");
+    assert!(distinct[1] > 1, "{distinct:?}");
+    let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
+    assert!(page.contains(&format!("Only {} of 8 episodes differ", result.distinct_outcomes)));
+    // Nothing was grasped, so there is no lift.
+    let text = std::fs::read_to_string(folder.join("table.csv")).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let head = lines.next().unwrap();
+    let lift = head.iter().position(|name| *name == "lift_mm").unwrap();
+    assert!(lines.all(|row| row[lift].is_empty()), "{text}");
+    let kept = std::fs::read(folder.join("episodes/scripted/000000/result.json")).unwrap();
+    let kept: serde_json::Value = serde_json::from_slice(&kept).unwrap();
+    assert!(["lift_mm", "slip_mm", "gap_mm", "snap_mm"].iter().all(|key| kept[*key].is_null()), "{kept}");
 }

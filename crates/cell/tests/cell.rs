@@ -161,6 +161,40 @@ fn every_kind_of_arm_lifts_the_tube_by_actions() {
     }
 }
 
+/// Brings open jaws to the tube and closes them by `jaws`, an opening a period: the force of the
+/// hold and that of the event (N), if anything is held.
+fn close_by(jaws: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let mut cell = Cell::new(&ideal(false), &two_tubes(ONE_END, 2.2e-3), 1).unwrap();
+    let pose = over(&cell, "left", HELD, 0.0);
+    let back = Pose { translation: pose.translation + 0.025 * DVec3::Z, ..pose };
+    send(&mut cell, "left", &back, 1.0, 60);
+    send(&mut cell, "left", &pose, 1.0, 30);
+    let mut said = None;
+    for jaw in jaws {
+        for event in send(&mut cell, "left", &pose, jaw, 1).1.into_iter().flat_map(|report| report.events) {
+            if let CellEvent::Attached { closing_force_n, .. } = event {
+                said = Some(closing_force_n);
+            }
+        }
+    }
+    let hold = cell.world().state.grasps.first().and_then(|g| g.compliance).map(|c| c.jaw_force);
+    assert_eq!(hold.is_some(), said.is_some());
+    Some((hold?, said?))
+}
+
+#[test]
+fn jaws_that_a_command_stops_hold_with_what_they_press() {
+    let whole = close_by(std::iter::repeat_n(0.0, 30)).unwrap();
+    assert!(whole.0 == 0.5 && whole.1 >= 0.475, "all the force: {whole:?}");
+    let stopped = close_by(std::iter::repeat_n(0.35, 30)).unwrap();
+    assert!(stopped.0 == stopped.1 && (0.05..0.45).contains(&stopped.0), "a part of it: {stopped:?}");
+    // On their way they pass that opening, and hold where they end.
+    let ramp = (1..=30).map(|k| (1.0 - 0.05 * f64::from(k)).max(0.0));
+    assert_eq!(close_by(ramp).unwrap().0, 0.5);
+    // Wide jaws that tissue hardly presses hold nothing.
+    assert_eq!(close_by(std::iter::repeat_n(0.9, 30)), None);
+}
+
 #[test]
 fn a_free_arm_refuses_what_it_cannot_do_and_keeps_the_speed_limits() {
     let specimen = meshed(ONE_END, 4e-3);

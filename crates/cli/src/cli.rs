@@ -6,6 +6,7 @@ mod render;
 mod scene;
 mod specimens;
 mod study;
+mod task;
 
 pub use episode::*;
 pub use evaluate::*;
@@ -13,11 +14,12 @@ pub use render::*;
 pub use scene::*;
 pub use specimens::*;
 pub use study::*;
+pub use task::*;
 pub use trocar_studies::names::{BackName, DesignName, MesherName, SensorName, SolverName, Units};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use trocar_scene::VariationSet;
+use trocar_scene::{Split, VariationSet};
 
 /// Trocar makes deformable organs from recordings of a surgical field, and scores robot policies on
 /// them.
@@ -56,6 +58,9 @@ pub enum Command {
     /// List, print, write and check scene files. A scene file describes the whole two-arm cell in
     /// TOML.
     Scene(Scene),
+    /// List, print and write tasks. A task is a list of stages in a scene file, each with the
+    /// condition that passes it.
+    Task(Tasks),
     /// Render a picture of a specimen, a scene or an episode through one of its cameras, or a video
     /// of a scene's scripted grasp-lift or of an episode.
     Render(Render),
@@ -81,6 +86,12 @@ pub enum Command {
 fn variation_set(name: &str) -> Result<VariationSet, String> {
     let known = VariationSet::ALL.map(VariationSet::name).join(", ");
     VariationSet::named(name).ok_or_else(|| format!("the sets are {known}"))
+}
+
+/// The split of that name, for the command line.
+fn split(name: &str) -> Result<Split, String> {
+    let known = Split::ALL.map(Split::name).join(", ");
+    Split::named(name).ok_or_else(|| format!("the splits are {known}"))
 }
 
 /// Arguments of `demo`.

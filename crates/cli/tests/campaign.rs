@@ -146,6 +146,9 @@ fn other_folders_scenes_and_seeds_are_refused_in_one_line() {
     assert_eq!(std::fs::read_dir(&foreign).unwrap().count(), 1, "it was written to");
     refused(&long, &folder, &[], "another scene");
     refused(&short, &folder, &["--seed", "1"], "another seed");
+    refused(&short, &folder, &["--split", "unseen"], "another split");
+    refused(&short, &folder, &["--variation", "none"], "another variation");
+    refused(&short, &folder, &["--by", "frction"], "did you mean 'friction'?");
     refused(&short, &folder, &["--policy", "genius"], "genius");
     // An invalid address is an error and no failed episode.
     for (address, why) in [("a=ws://", "host"), ("ws://h:0", "port"), ("ws://user:word@h", "TROCAR_POLICY_KEY")] {

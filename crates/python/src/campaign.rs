@@ -12,10 +12,10 @@ use pyo3::types::PyBytes;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
-use trocar_campaign::{EpisodeFiles, Error, Job, Manifest, PolicySpec, Store};
+use trocar_campaign::{By, EpisodeFiles, Error, Job, Manifest, PolicySpec, Store};
 use trocar_core::Progress;
 use trocar_scene::Scene;
-use trocar_workflow::SpecimenCache;
+use trocar_workflow::{SpecimenCache, drawn_specimens};
 
 /// A campaign's manifest and its folder, which is locked against other processes.
 #[pyclass(frozen, module = "trocar._native")]
@@ -23,6 +23,7 @@ pub struct Campaign {
     scene: Scene,
     specimens: SpecimenCache,
     manifest: Manifest,
+    by: Vec<By>,
     store: Mutex<Store>,
 }
 
@@ -44,6 +45,7 @@ type FileList = Vec<(String, Vec<u8>)>;
 impl Campaign {
     /// Opens or creates the campaign in the folder `output`.
     #[new]
+    #[pyo3(signature = (scene, policies, episodes, seed, phantoms, output, *, split="seen", variation=None, by=Vec::new()))]
     fn new(
         py: Python<'_>,
         scene: &str,
@@ -52,8 +54,12 @@ impl Campaign {
         seed: u64,
         phantoms: PathBuf,
         output: PathBuf,
+        split: &str,
+        variation: Option<&str>,
+        by: Vec<String>,
     ) -> PyResult<Self> {
         py.detach(|| {
+            let split = prepare::split(split)?;
             let specs: Result<Vec<PolicySpec>, _> = policies.iter().map(|p| PolicySpec::parse(p)).collect();
             let specs = specs.map_err(|e| evaluate(&e))?;
             if Path::new(scene).exists() && output.exists() {
@@ -62,11 +68,14 @@ impl Campaign {
                     return Err(wrong("output: the scene file is in this folder; write into another"));
                 }
             }
-            let scene = prepare::scene(scene, None, None)?;
-            let (specimens, named) = prepare::named_specimens(&scene, &phantoms)?;
-            let manifest = Manifest::new(&scene, &named, &specs, episodes, seed).map_err(|e| evaluate(&e))?;
+            let scene = prepare::varied(scene, variation)?;
+            let by = By::parse(&by, &scene, split).map_err(|e| evaluate(&e))?;
+            let (specimens, named) = prepare::named_specimens(&scene, split, &phantoms)?;
+            let manifest = Manifest::new(&scene, &named, &specs, episodes, (split, seed)).map_err(|e| evaluate(&e))?;
+            let drawn = drawn_specimens(&scene, manifest.seeds());
+            specimens.make_all(&drawn, &Signals::new()).map_err(|e| evaluate(&e))?;
             let store = Mutex::new(Store::open(&output, &manifest).map_err(|e| evaluate(&e))?);
-            Ok(Self { scene, specimens, manifest, store })
+            Ok(Self { scene, specimens, manifest, by, store })
         })
     }
 
@@ -104,7 +113,7 @@ impl Campaign {
                     .write_videos(&self.manifest, &self.scene, &self.specimens, &Signals::new())
                     .map_err(|e| evaluate(&e))?;
             }
-            let result = store.write_results(&self.manifest).map_err(|e| evaluate(&e))?;
+            let result = store.write_results(&self.manifest, &self.by).map_err(|e| evaluate(&e))?;
             serde_json::to_string_pretty(&result).map_err(wrong)
         })
     }
@@ -164,16 +173,18 @@ impl Worker {
         let stop = stop.map(|s| Arc::clone(&s.0)).unwrap_or_default();
         let manifest: Manifest = serde_json::from_str(plan).map_err(|e| wrong(format!("plan: {e}")))?;
         py.detach(|| {
-            let scene = prepare::scene(scene, None, None)?;
-            let (specimens, named) = prepare::named_specimens(&scene, &phantoms)?;
-            let own = Manifest::new(&scene, &named, &manifest.policies, manifest.episodes, manifest.seed).map_err(|e| evaluate(&e))?;
+            let scene = prepare::varied(scene, Some(manifest.variation.set.name()))?;
+            let (specimens, named) = prepare::named_specimens(&scene, manifest.split, &phantoms)?;
+            let first = (manifest.split, manifest.seed);
+            let own = Manifest::new(&scene, &named, &manifest.policies, manifest.episodes, first);
+            let own = own.map_err(|e| evaluate(&e))?;
             if own != manifest {
                 return Err(wrong(
                     "this worker has another scene, specimen or program than the campaign; give all machines the same files",
                 ));
             }
             check_stop(&stop)?;
-            let worker = trocar_campaign::Worker::new(&scene, &specimens).map_err(|e| evaluate(&e))?;
+            let worker = trocar_campaign::Worker::new(&scene, &specimens, manifest.first_seed()).map_err(|e| evaluate(&e))?;
             let worker = Mutex::new(worker.with_stop_flag(Arc::clone(&stop)).with_python(python));
             Ok(Self { worker, stop })
         })

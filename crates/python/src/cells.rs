@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::path::PathBuf;
 use trocar_cell::{Action, ActionSpace};
-use trocar_task::{Bounds, Channels, End, Episode, EpisodeState, STATE_NAMES, STATE_SIZE, Stage};
+use trocar_task::{Bounds, Channels, End, Episode, EpisodeState, STATE_NAMES, STATE_SIZE};
 use trocar_workflow::{SpecimenCache, drawn_specimens};
 
 /// Numbers a cell and step in `figures`: reward, score, stages passed, how it ended (-1 while it
@@ -18,7 +18,7 @@ use trocar_workflow::{SpecimenCache, drawn_specimens};
 const FIGURES: [&str; 5] = ["reward", "score", "stage", "end", "time_s"];
 
 /// Names of the ends, by their number in `figures`.
-const ENDS: [&str; 6] = ["passed", "time-out", "rcm-abort", "diverged", "policy-error", "finished"];
+const ENDS: [&str; 7] = ["passed", "time-out", "rcm-abort", "diverged", "policy-error", "finished", "aborted"];
 
 /// A saved episode. It stays in the process: nothing loaded from disk is trusted with so much.
 #[pyclass(frozen, module = "trocar._native")]
@@ -32,7 +32,7 @@ pub struct Cells {
     specimens: SpecimenCache,
     bounds: Bounds,
     pub(crate) pool: rayon::ThreadPool,
-    task_name: &'static str,
+    task_name: String,
     prompt: String,
     steps: usize,
     /// The process that made them. The pool's threads do not live on in a child made by `fork`, and
@@ -71,7 +71,9 @@ impl Place<'_> {
         self.figures.copy_from_slice(&[reward, progress.score(), progress.stage as f64, end, episode.time()]);
         if !self.channels.is_empty() {
             let row = episode.rows().last().copied().unwrap_or_default();
-            self.channels.copy_from_slice(&row.to_row());
+            let (channels, measures) = self.channels.split_at_mut(Channels::COUNT);
+            channels.copy_from_slice(&row.to_row());
+            measures.copy_from_slice(&row.measures[..measures.len()]);
         }
     }
 
@@ -94,7 +96,7 @@ impl Cells {
     /// `count` episodes of `scene` on `threads` threads (0: as many as the machine has; results do
     /// not depend on them).
     #[new]
-    #[pyo3(signature = (scene, count, *, phantoms, threads=0, task=None, actions="pivots", episode_s=None, sensor_noise=false))]
+    #[pyo3(signature = (scene, count, *, phantoms, threads=0, task=None, actions="pivots", episode_s=None, sensor_noise=false, variation=None, split="seen"))]
     fn new(
         py: Python<'_>,
         scene: &str,
@@ -105,6 +107,8 @@ impl Cells {
         actions: &str,
         episode_s: Option<f64>,
         sensor_noise: bool,
+        variation: Option<&str>,
+        split: &str,
     ) -> PyResult<Self> {
         if count == 0 || count > 4096 {
             return Err(wrong(format!("num_envs: is {count}; 1 to 4096 cells")));
@@ -117,18 +121,21 @@ impl Cells {
                 return Err(wrong(format!("actions: '{other}' is unknown; {known} are known")));
             }
         };
-        let scene = prepare::scene(scene, task, episode_s)?;
+        let scene = prepare::scene(scene, variation, task, episode_s)?;
+        let split = prepare::split(split)?;
         py.detach(|| {
-            let specimens = prepare::specimens(&scene, &phantoms)?;
+            let specimens = prepare::specimens(&scene, split, &phantoms)?;
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(wrong)?;
             // One cell uses all threads; of many, each has its own.
             let each = if count == 1 { threads } else { 1 };
-            let episodes = built(&pool, count, || Episode::with_specimens(&scene, Box::new(specimens.clone()), each))?;
+            let seed = split.seed(0);
+            let begun = || Episode::begun(&scene, Box::new(specimens.clone()), each, seed, scene.draw(seed));
+            let episodes = built(&pool, count, begun)?;
             let bounds = Bounds::new(episodes[0].cell(), space).map_err(|e| crate::error::task(&e))?;
             let steps = (scene.task.episode_s * f64::from(scene.rates.control_hz)).round() as usize;
             let prompt = trocar_task::prompt(&scene);
             let eyes = Eyes::new(count, sensor_noise);
-            let (task_name, process) = (scene.task.name.name(), std::process::id());
+            let (task_name, process) = (scene.task.name.name().to_owned(), std::process::id());
             Ok(Self { episodes, eyes, specimens, bounds, pool, task_name, prompt, steps, process })
         })
     }
@@ -141,8 +148,8 @@ impl Cells {
 
     /// Name of the task.
     #[getter]
-    fn task(&self) -> &'static str {
-        self.task_name
+    fn task(&self) -> &str {
+        &self.task_name
     }
 
     /// What the task asks for, in words.
@@ -178,7 +185,8 @@ impl Cells {
     /// Names of the channels.
     #[getter]
     fn channel_names(&self) -> Vec<String> {
-        Channels::names()
+        let measures = &self.episodes[0].program().measures;
+        Channels::names().into_iter().chain(measures.iter().map(ToString::to_string)).collect()
     }
 
     /// Names of the figures.
@@ -195,8 +203,8 @@ impl Cells {
 
     /// Names of the task's stages.
     #[getter]
-    fn stage_names(&self) -> Vec<&'static str> {
-        Stage::of(self.episodes[0].scene().task.name).iter().map(|s| s.name()).collect()
+    fn stage_names(&self) -> Vec<String> {
+        self.episodes[0].program().stages.iter().map(|s| s.name.clone()).collect()
     }
 
     /// Writes what `cameras` see of the cells that `active` says: `color` has an array (cells,

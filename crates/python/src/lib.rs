@@ -32,5 +32,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(policy::policies, module)?)?;
     module.add_function(wrap_pyfunction!(prepare::scenes, module)?)?;
     module.add_function(wrap_pyfunction!(prepare::phantoms_folder, module)?)?;
+    module.add_function(wrap_pyfunction!(prepare::missing_specimens, module)?)?;
     Ok(())
 }

@@ -6,9 +6,10 @@ use crate::progress::Signals;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use trocar_scene::{BUILTINS, Scene, TaskName};
+use trocar_campaign::DEFAULT_VARIATION;
+use trocar_scene::{BUILTIN_TASKS, BUILTINS, Scene, Split, VariationSet};
 use trocar_specimen::Specimen;
-use trocar_workflow::SpecimenCache;
+use trocar_workflow::{SpecimenCache, read_varied};
 
 /// Names of the built-in scenes.
 #[pyfunction]
@@ -16,14 +17,36 @@ pub fn scenes() -> Vec<&'static str> {
     BUILTINS.iter().map(|b| b.name).collect()
 }
 
-/// The scene `name` (or file), asking for `task` where that is given and for `episode_s` seconds.
-pub fn scene(name: &str, task: Option<&str>, episode_s: Option<f64>) -> PyResult<Scene> {
-    let mut scene = Scene::read(name).map_err(wrong)?;
+/// The split of that name.
+pub fn split(name: &str) -> PyResult<Split> {
+    let known = Split::ALL.map(Split::name).join(", ");
+    Split::named(name).ok_or_else(|| wrong(format!("split: '{name}' is unknown; it must be one of {known}")))
+}
+
+/// The scene `name` (or file) with the set `variation`. Without one, a scene that has no set varies
+/// as campaigns do.
+pub fn varied(name: &str, variation: Option<&str>) -> PyResult<Scene> {
+    let set = variation.map(|set| {
+        let known = VariationSet::ALL.map(VariationSet::name).join(", ");
+        let unknown = || wrong(format!("variation: '{set}' is unknown; it must be one of {known}"));
+        VariationSet::named(set).ok_or_else(unknown)
+    });
+    read_varied(name, set.transpose()?, DEFAULT_VARIATION).map_err(|e| evaluate(&e))
+}
+
+/// The same, asking for `task` where that is given and for `episode_s` seconds.
+pub fn scene(name: &str, variation: Option<&str>, task: Option<&str>, episode_s: Option<f64>) -> PyResult<Scene> {
+    let mut scene = varied(name, variation)?;
     if let Some(task) = task {
-        let all = [TaskName::AppendixResection, TaskName::GraspLift, TaskName::PortReach];
-        scene.task.name = all.into_iter().find(|t| t.name() == task).ok_or_else(|| {
-            wrong(format!("task: '{task}' is unknown; {} are known", all.map(TaskName::name).join(", ")))
-        })?;
+        // A scene with stages of its own has one task.
+        if scene.task.name.name() != task || scene.task.stages.is_empty() {
+            let all = BUILTIN_TASKS.map(|b| b.name);
+            scene.task.name = all.into_iter().find(|t| t.name() == task).ok_or_else(|| {
+                let known: Vec<&str> = all.iter().map(|t| t.name()).collect();
+                wrong(format!("task: '{task}' is unknown; {} are known", known.join(", ")))
+            })?;
+            (scene.task.stages, scene.task.aborts, scene.task.prompt) = (Vec::new(), Vec::new(), None);
+        }
     }
     if let Some(seconds) = episode_s {
         if !(seconds > 0.0 && seconds.is_finite()) {
@@ -41,18 +64,30 @@ pub fn phantoms_folder() -> PathBuf {
     trocar_phantom::phantoms_folder()
 }
 
-/// The specimens of the episodes of `scene`. The first one is made now in the folder `phantoms`,
-/// which takes seconds the first time; others when an episode has them.
-pub fn specimens(scene: &Scene, phantoms: &Path) -> PyResult<SpecimenCache> {
+/// The number of anatomies that the episodes of a scene in `split` draw from and that are not in
+/// the folder `phantoms` yet. Each takes about a minute to make.
+#[pyfunction]
+#[pyo3(signature = (scene, variation, split, phantoms))]
+pub fn missing_specimens(scene: &str, variation: Option<&str>, split: &str, phantoms: PathBuf) -> PyResult<usize> {
+    let (scene, split) = (varied(scene, variation)?, self::split(split)?);
+    let specimens = SpecimenCache::new(&scene, &phantoms);
+    let all = scene.specimens();
+    Ok(split.of_specimens(&all).iter().filter(|source| !specimens.is_made(source)).count())
+}
+
+/// The specimens of the episodes of `scene` in `split`. They are made now in the folder `phantoms`,
+/// so that no episode waits for one.
+pub fn specimens(scene: &Scene, split: Split, phantoms: &Path) -> PyResult<SpecimenCache> {
     let specimens = SpecimenCache::new(scene, phantoms);
-    specimens.read(&scene.draw(0).specimen, &Signals::new()).map_err(|e| evaluate(&e))?;
+    let all = scene.specimens();
+    specimens.make_all(split.of_specimens(&all), &Signals::new()).map_err(|e| evaluate(&e))?;
     Ok(specimens)
 }
 
 /// The same, and the specimen by which a campaign of `scene` is known.
-pub fn named_specimens(scene: &Scene, phantoms: &Path) -> PyResult<(SpecimenCache, Arc<Specimen>)> {
+pub fn named_specimens(scene: &Scene, split: Split, phantoms: &Path) -> PyResult<(SpecimenCache, Arc<Specimen>)> {
     let specimens = SpecimenCache::new(scene, phantoms);
-    let named = trocar_campaign::named_specimen(scene);
+    let named = trocar_campaign::named_specimen(scene, split);
     let named = specimens.read(&named, &Signals::new()).map_err(|e| evaluate(&e))?;
     Ok((specimens, named))
 }

@@ -37,6 +37,35 @@ impl Ranged for Axis {
     }
 }
 
+/// The smallest span of an axis of that `label`, which ends in its unit in round brackets: what a
+/// real cell can measure. Less is noise, which a plot must not magnify.
+fn min_span(label: &str) -> f64 {
+    match label.rsplit_once('(').map_or("", |(_, unit)| unit.trim_end_matches(')')) {
+        "mm" => 0.01,
+        "m" => 1e-5,
+        "N" => 0.001,
+        _ => 0.0,
+    }
+}
+
+/// The ends of an axis of that `label`, apart by at least what a real cell can measure. An end at 0
+/// stays. On a logarithmic axis the ends are exponents of ten.
+pub fn measurable((low, high): (f64, f64), label: &str, log: bool) -> (f64, f64) {
+    let span = min_span(label);
+    if log {
+        let (a, b) = (10f64.powf(low), 10f64.powf(high));
+        return if b - a < span { (low, (a + span).log10()) } else { (low, high) };
+    }
+    match high - low {
+        wide if wide >= span => (low, high),
+        _ if low == 0.0 => (0.0, span),
+        narrow => {
+            let beside = 0.5 * (span - narrow);
+            (low - beside, high + beside)
+        }
+    }
+}
+
 /// The label of a tick, with the decimals that the span of the axis needs.
 pub fn decimal(value: f64, span: f64) -> String {
     let decimals = (1.0 - (span / 5.0).log10().floor()).clamp(0.0, 6.0) as usize;
@@ -98,6 +127,23 @@ fn power_of_ten(exponent: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_axis_is_not_narrower_than_what_can_be_measured() {
+        let span = |(low, high): (f64, f64)| high - low;
+        for (label, least) in [("slip (mm)", 0.01), ("jaw force (N)", 0.001), ("depth (m)", 1e-5)] {
+            let narrow = (3.0, 3.0 + 0.1 * least);
+            let wider = measurable(narrow, label, false);
+            assert!((span(wider) - least).abs() < 1e-12 && wider.0 < narrow.0 && wider.1 > narrow.1, "{label}");
+            assert_eq!(measurable((0.0, 0.1 * least), label, false), (0.0, least));
+            assert_eq!(measurable((0.0, 2.0 * least), label, false), (0.0, 2.0 * least));
+            let (low, high) = measurable((0.3, 0.3 + 1e-9), label, true);
+            assert!((10f64.powf(high) - 10f64.powf(low) - least).abs() < 1e-12, "{label}");
+        }
+        assert_eq!(measurable((3.0, 3.0 + 1e-9), "share", false), (3.0, 3.0 + 1e-9));
+        // Not force, but torque.
+        assert_eq!(min_span("joint friction (N m)"), 0.0);
+    }
 
     #[test]
     fn ticks_have_short_labels() {

@@ -152,6 +152,11 @@ pub fn list(items: &[String]) -> String {
     format!("<ul>{}</ul>\n", items.join(""))
 }
 
+/// A part that is folded until the reader opens it. `title` is plain text, `body` is HTML.
+pub fn fold(title: &str, body: &str) -> String {
+    format!("<details><summary>{}</summary>\n{body}</details>\n", escape(title))
+}
+
 /// Names and values (plain texts) in two columns.
 pub fn definitions(entries: &[(&str, String)]) -> String {
     let mut out = String::from("<dl>");
@@ -212,6 +217,8 @@ td.bad{color:var(--bad);font-weight:640}
 .plain td.long{min-width:16rem}
 .plain td+td{font-variant-numeric:tabular-nums}
 ul{margin:0 0 14px;padding-left:1.2em}
+details{margin:0 0 14px}
+summary{cursor:pointer;color:var(--accent);margin:0 0 8px}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:4px 18px;margin:0;font-size:.9rem}
 dt{color:var(--soft)}
 dd{margin:0;overflow-wrap:anywhere}

@@ -1,7 +1,7 @@
 //! Line plots as inline SVG. Text and axes have the text colour of the page, through
 //! `currentColor`.
 
-use crate::axis::{Axis, decimal, log_label};
+use crate::axis::{Axis, decimal, log_label, measurable};
 use crate::{Error, Result, page};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -91,11 +91,13 @@ impl Plot<'_> {
         let Some((left, right)) = range(lines.iter().flatten().map(|p| p.0)) else {
             return Ok(format!("<p class=\"lead\">Nothing to plot for {}.</p>", page::escape(self.title)));
         };
+        let (left, right) = measurable((left, right), self.x, self.log_x);
         // Room for values next to a power of ten.
         let beside = if self.log_x { 0.04 * (right - left) } else { 0.0 };
         let x_range = (left - beside, right + beside);
         let shown = self.show.iter().chain(&self.limits).filter(|y| shown_on(self.log_y, **y)).map(|y| scale(*y));
         let (low, high) = range(lines.iter().flatten().map(|p| p.1).chain(shown)).unwrap_or((0.0, 1.0));
+        let (low, high) = measurable((low, high), self.y, self.log_y);
         let y_range = if self.log_y {
             (low.floor(), high.ceil().max(low.floor() + 1.0))
         } else {
@@ -232,6 +234,23 @@ mod tests {
         assert!(plot(vec![(0.0, 1e300), (1.0, -1e300)], false).contains("<svg"));
         // Values of diverged runs.
         assert!(plot(vec![(0.0, 0.0), (1.0, f64::MAX), (f64::MAX, 1.0)], false).contains("<svg"));
+    }
+
+    #[test]
+    fn differences_that_cannot_be_measured_look_like_none() {
+        let of = |unit: &str| {
+            let y = format!("largest RCM deviation ({unit})");
+            let lines = vec![Line::new(vec![(0.0, 8.000_01), (1.0, 8.000_02)], [10, 20, 30])];
+            Plot { title: "noise", x: "time (s)", y: &y, lines, ..Plot::default() }.svg().unwrap()
+        };
+        let heights = |svg: &str| -> Vec<f64> {
+            let line = svg.split("<polyline").find(|p| p.contains("#0A141E")).unwrap();
+            let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
+            points.split_whitespace().map(|p| p.split(',').nth(1).unwrap().parse().unwrap()).collect()
+        };
+        let rise = |unit: &str| heights(&of(unit)).windows(2).map(|h| (h[1] - h[0]).abs()).fold(0.0, f64::max);
+        assert!(rise("mm") <= 1.0, "10 nm of 0.01 mm: {}", rise("mm"));
+        assert!(rise("share") > 100.0, "{}", rise("share"));
     }
 
     #[test]

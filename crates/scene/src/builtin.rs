@@ -12,11 +12,18 @@ pub struct Builtin {
 }
 
 /// The built-in scenes.
-pub const BUILTINS: [Builtin; 1] = [Builtin {
-    name: "cell-a",
-    summary: "the paper's two-arm cell around phantom A: grasper left, cutter right, resection of the appendix",
-    text: include_str!("../scenes/cell-a.toml"),
-}];
+pub const BUILTINS: [Builtin; 2] = [
+    Builtin {
+        name: "cell-a",
+        summary: "the paper's two-arm cell around phantom A: grasper left, cutter right, resection of the appendix",
+        text: include_str!("../scenes/cell-a.toml"),
+    },
+    Builtin {
+        name: "cell-a-retraction",
+        summary: "the same cell: the grasper pulls the appendix aside and holds it, as a task of stages in the scene",
+        text: include_str!("../scenes/cell-a-retraction.toml"),
+    },
+];
 
 impl Builtin {
     /// The built-in scene of that name.

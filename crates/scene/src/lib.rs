@@ -16,15 +16,19 @@ mod camera;
 mod cell;
 mod check;
 mod error;
+mod expression;
 mod imaging;
 mod phantoms;
 mod port;
+mod program;
 mod random;
 mod read;
 mod scene;
 mod schema;
+mod stages;
 mod start;
 mod task;
+mod task_name;
 mod variation;
 
 pub use anatomy::{
@@ -35,11 +39,19 @@ pub use builtin::{BUILTINS, Builtin};
 pub use camera::{CellCamera, Lens, View};
 pub use cell::{Arm, ArmModel, Controller, Drive, FRANKA_FR3, Frame, GravityError, Instrument, InstrumentKind, Side};
 pub use error::{Error, Result};
+pub use expression::{
+    Comparison, Condition, MOST_MEASURES, Measure, Number, Operation, Part, Place, Target, channel_names,
+};
 pub use imaging::Imaging;
 pub use phantoms::{PHANTOMS, Phantom};
 pub use port::Port;
+pub use program::{
+    AbortProgram, HintPart, Program, ScriptAction, ScriptProgram, StageProgram, TaskContext, TaskMistake,
+};
 pub use random::EpisodeRandom;
 pub use scene::{Rates, Scene, Tool};
+pub use stages::{Abort, BUILTIN_TASKS, BuiltinTask, Definition, ScriptStep, Stage, StageOrder};
 pub use start::Start;
-pub use task::{Gates, GraspDesignName, Safety, SafetyRules, Task, TaskName};
-pub use variation::{Distribution, Drawn, DrawnValue, Factor, Per, Specimens, Variation, VariationSet};
+pub use task::{Gates, GraspDesignName, Safety, SafetyRules, Task};
+pub use task_name::TaskName;
+pub use variation::{Distribution, Drawn, DrawnValue, Factor, Per, Specimens, Split, Variation, VariationSet};

@@ -1,31 +1,9 @@
 //! The task of an episode, the gates of its stages, and safety limits.
 
+use crate::{Abort, ScriptStep, Stage, StageOrder, TaskName};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// Tasks by name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum TaskName {
-    /// Grasp, lift, positioning, jaw on tissue, cut.
-    #[default]
-    AppendixResection,
-    /// Grasp and lift with one arm.
-    GraspLift,
-    /// Free motion of the instruments in their ports.
-    PortReach,
-}
-
-impl TaskName {
-    /// Its name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::AppendixResection => "appendix-resection",
-            Self::GraspLift => "grasp-lift",
-            Self::PortReach => "port-reach",
-        }
-    }
-}
+use std::collections::BTreeMap;
 
 /// Grasp designs by name; they are those of the cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -46,7 +24,7 @@ pub enum GraspDesignName {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Task {
-    /// appendix-resection, grasp-lift or port-reach.
+    /// appendix-resection, grasp-lift, port-reach, or the name of a task whose stages stand here.
     pub name: TaskName,
     /// The organ it is about.
     pub organ: String,
@@ -64,8 +42,28 @@ pub struct Task {
     /// the policy has finished.
     #[serde(skip_serializing_if = "is_true")]
     pub stop_when_passed: bool,
-    /// When stages count as done.
+    /// What policies are asked for, in words, with {organ}, {grasper} and {cutter}; the built-in
+    /// task's if left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prompt: Option<String>,
+    /// In which order the task's own stages pass: listed or any.
+    #[serde(skip_serializing_if = "StageOrder::is_listed")]
+    pub order: StageOrder,
+    /// When stages count as done: `gates.lift_mm` and so on in expressions.
     pub gates: Gates,
+    /// Numbers of the task's own for its expressions, such as `constants.aside_mm`. A name ends in
+    /// its unit.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub constants: BTreeMap<String, f64>,
+    /// The stages; those of the built-in task if left out.
+    #[serde(rename = "stage", skip_serializing_if = "Vec::is_empty")]
+    pub stages: Vec<Stage>,
+    /// What ends an episode as failed.
+    #[serde(rename = "abort", skip_serializing_if = "Vec::is_empty")]
+    pub aborts: Vec<Abort>,
+    /// The steps of the scripted baseline of a task of one's own.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub script: Vec<ScriptStep>,
 }
 
 impl Default for Task {
@@ -78,7 +76,13 @@ impl Default for Task {
             first_grasp: None,
             sever: false,
             stop_when_passed: true,
+            prompt: None,
+            order: StageOrder::default(),
             gates: Gates::default(),
+            constants: BTreeMap::new(),
+            stages: Vec::new(),
+            aborts: Vec::new(),
+            script: Vec::new(),
         }
     }
 }
@@ -86,13 +90,6 @@ impl Default for Task {
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
 fn is_true(value: &bool) -> bool {
     *value
-}
-
-impl Task {
-    /// Whether the task is about an organ.
-    pub fn needs_organ(&self) -> bool {
-        self.name != TaskName::PortReach
-    }
 }
 
 /// When the stages of the resection count as done (SPEC, stage gates), in their order.

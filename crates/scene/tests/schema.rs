@@ -23,7 +23,7 @@ fn scenes_validate() {
     for bad in [
         "name = 'a'",
         "name = 'a'\nnam = 1\n[specimen]\nphantom = 'phantom-a'",
-        "name = 'a'\n[specimen]\nphantom = 'phantom-a'\n[task]\nname = 'appendectomy'",
+        "name = 'a'\n[specimen]\nphantom = 'phantom-a'\n[task]\nname = 'Appendectomy'",
         "name = 'a'\n[specimen]\nphantom = 'phantom-a'\n[rates]\ncontrol_hz = 'fast'",
         "name = 'a'\n[specimen]\nphantom = 'phantom-a'\n[organ.cecum.material]\nmodel = 'rubber'",
         "name = 'a'\n[specimen]\nphantom = 'phantom-a'\n[organ.cecum.pins]\nrule = 'band'",

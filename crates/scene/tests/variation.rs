@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::collections::BTreeSet;
-use trocar_scene::{Distribution, Drawn, Factor, Scene, SpecimenSource, Specimens, Variation, VariationSet};
+use trocar_scene::{Distribution, Drawn, Factor, Scene, SpecimenSource, Specimens, Split, Variation, VariationSet};
 use trocar_specimen::Specimen;
 
 fn cell_a(set: VariationSet) -> Scene {
@@ -92,14 +92,29 @@ fn what_is_drawn_comes_back_from_its_table() {
 fn specimens_are_drawn_evenly() {
     let mut scene = cell_a(VariationSet::Standard);
     assert_eq!(scene.specimens().len(), 8);
-    let seen: BTreeSet<String> = (0..200).map(|seed| scene.draw(seed).specimen.label()).collect();
-    assert_eq!(seen.len(), 8, "{seen:?}");
+    let drawn = |scene: &Scene, split: Split| -> BTreeSet<String> {
+        (0..200).map(|k| scene.draw(split.seed(k)).specimen.label()).collect()
+    };
+    let (seen, unseen) = (drawn(&scene, Split::Seen), drawn(&scene, Split::Unseen));
+    assert_eq!((seen.len(), unseen.len(), drawn(&scene, Split::Both).len()), (6, 2, 8), "{seen:?} {unseen:?}");
+    assert!(seen.is_disjoint(&unseen) && unseen.contains("phantom-a:8"), "{unseen:?}");
     scene.variation.specimens =
         Some(Specimens { paths: Vec::new(), phantoms: vec!["phantom-a".into(), "phantom-c".into()], seeds: [4, 6] });
-    let seen: BTreeSet<String> = (0..200).map(|seed| scene.draw(seed).specimen.label()).collect();
-    assert_eq!(seen.len(), 6, "{seen:?}");
-    assert!(seen.contains("phantom-c:5"));
+    let (seen, unseen) = (drawn(&scene, Split::Seen), drawn(&scene, Split::Unseen));
+    assert_eq!((seen.len(), unseen.len()), (4, 2), "{seen:?} {unseen:?}");
+    assert!(seen.contains("phantom-c:4") && unseen.contains("phantom-c:5"));
     assert_eq!(cell_a(VariationSet::Easy).specimens(), [SpecimenSource::phantom("phantom-a", 1)]);
+}
+
+#[test]
+fn the_default_set_is_for_scenes_without_one() {
+    let standard = |scene: &Scene, given| scene.variation.chosen(given, VariationSet::Standard).set;
+    assert_eq!(standard(&cell_a(VariationSet::None), None), VariationSet::Standard);
+    assert_eq!(standard(&cell_a(VariationSet::Easy), None), VariationSet::Easy);
+    assert_eq!(standard(&cell_a(VariationSet::Easy), Some(VariationSet::None)), VariationSet::None);
+    // What the scene names stays as it is named.
+    let chosen = cell_a(VariationSet::None).variation.chosen(None, VariationSet::Standard);
+    assert_eq!(chosen.factors, cell_a(VariationSet::None).variation.factors);
 }
 
 #[test]

@@ -19,14 +19,19 @@ pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T> {
 /// # Errors
 /// One line "line: field: what is wrong", as far as these are known.
 pub fn parse_toml<T: DeserializeOwned>(text: &str) -> std::result::Result<T, String> {
-    let line =
-        |e: &toml::de::Error| e.span().map_or_else(String::new, |s| format!("line {}: ", line_at(text, s.start)));
-    let document = toml::Deserializer::parse(text).map_err(|e| format!("{}{}", line(&e), one_line(e.message())))?;
-    serde_path_to_error::deserialize(document).map_err(|e| {
+    let document: toml::Table = text.parse().map_err(|e: toml::de::Error| {
+        let line = e.span().map_or_else(String::new, |s| format!("line {}: ", line_at(text, s.start)));
+        format!("{line}{}", one_line(e.message()))
+    })?;
+    serde_path_to_error::deserialize(toml::Value::Table(document)).map_err(|e| {
         let field = e.path().to_string();
-        let inner = e.inner();
-        let place = if field == "." || field == "?" { String::new() } else { format!("{field}: ") };
-        format!("{}{place}{}{}", line(inner), one_line(inner.message()), suggestion(inner.message()))
+        let (place, line) = match field.as_str() {
+            "." | "?" => (String::new(), Some(1)),
+            _ => (format!("{field}: "), line_of(text, &field)),
+        };
+        let line = line.map_or_else(String::new, |n| format!("line {n}: "));
+        let message = e.inner().message();
+        format!("{line}{place}{}{}", one_line(message), suggestion(message))
     })
 }
 

@@ -3,8 +3,8 @@
 use crate::bench::{CellBench, EpisodeBench, GraspBench, MeshingBench, OrgansBench, RenderBench, ScalingBench};
 use crate::experiment::{
     ControllerGridExperiment, ConvergenceExperiment, ElementQualityExperiment, GraspDesignsExperiment,
-    IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment, ReconstructionExperiment, RolloutsExperiment,
-    SettlingExperiment, SimilarityExperiment, WrenchExperiment,
+    IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment, ReconstructionExperiment,
+    RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment, WrenchExperiment,
 };
 use crate::study::{Entry, Of};
 
@@ -21,6 +21,7 @@ pub static STUDIES: &[&dyn Entry] = &[
     &Of::<WrenchExperiment>::NEW,
     &Of::<RandomActionsExperiment>::NEW,
     &Of::<RolloutsExperiment>::NEW,
+    &Of::<RobustnessExperiment>::NEW,
     &Of::<SimilarityExperiment>::NEW,
     &Of::<MeshingBench>::NEW,
     &Of::<OrgansBench>::NEW,

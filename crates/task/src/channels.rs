@@ -2,6 +2,7 @@
 //! functions of these rows alone.
 
 use serde::Serialize;
+use trocar_scene::MOST_MEASURES;
 
 /// Declares a struct of numbers with their names in order.
 macro_rules! row {
@@ -13,6 +14,11 @@ macro_rules! row {
         impl $name {
             /// Names of the numbers, in order.
             pub const NAMES: [&'static str; [$(stringify!($field)),*].len()] = [$(stringify!($field)),*];
+
+            /// The number at `place` of [`NAMES`](Self::NAMES); 0 beyond.
+            fn at(&self, place: usize) -> f64 {
+                [$(self.$field),*].get(place).copied().unwrap_or(0.0)
+            }
 
             fn push(&self, all: &mut Vec<f64>) {
                 all.extend([$(self.$field),*]);
@@ -187,6 +193,9 @@ pub struct Channels {
     pub right: ArmChannels,
     /// The task.
     pub task: TaskChannels,
+    /// What the task measures beside, in the order of its
+    /// [`Program`](trocar_scene::Program); zeros after.
+    pub measures: [f64; MOST_MEASURES],
 }
 
 impl Channels {
@@ -200,7 +209,19 @@ impl Channels {
         self.task.diverged > 0.0 || out(self.left.rcm_peak_mm) || out(self.right.rcm_peak_mm)
     }
 
-    /// Names of the numbers of a row, in order: `time_s`, `left_*`, `right_*`, then the task's.
+    /// The number at `place` of [`names`](Self::names).
+    pub fn at(&self, place: usize) -> f64 {
+        let arm = ArmChannels::NAMES.len();
+        match place {
+            0 => self.time_s,
+            k if k <= arm => self.left.at(k - 1),
+            k if k <= 2 * arm => self.right.at(k - 1 - arm),
+            k => self.task.at(k - 1 - 2 * arm),
+        }
+    }
+
+    /// Names of the numbers of a row but for what the task measures beside, in order: `time_s`,
+    /// `left_*`, `right_*`, then the task's.
     pub fn names() -> Vec<String> {
         let arm = |side: &'static str| ArmChannels::NAMES.into_iter().map(move |n| format!("{side}_{n}"));
         let task = TaskChannels::NAMES.into_iter().map(str::to_owned);
@@ -222,7 +243,8 @@ impl Channels {
         let mut from = row.iter().copied();
         let time_s = from.next()?;
         let (left, right) = (ArmChannels::take(&mut from)?, ArmChannels::take(&mut from)?);
-        let made = Self { time_s, left, right, task: TaskChannels::take(&mut from)? };
+        let task = TaskChannels::take(&mut from)?;
+        let made = Self { time_s, left, right, task, measures: [0.0; MOST_MEASURES] };
         from.next().is_none().then_some(made)
     }
 
@@ -256,6 +278,8 @@ mod tests {
         let made = Channels::from_row(&row).unwrap();
         assert_eq!(made.to_row(), row);
         let place = |name: &str| names.iter().position(|n| n == name).unwrap() as f64;
+        assert_eq!(names, trocar_scene::channel_names(), "what expressions may name");
+        assert!((0..Channels::COUNT).all(|k| made.at(k) == row[k]));
         assert_eq!(made.left.jaw, place("left_jaw"));
         assert_eq!(made.right.rcm_peak_mm, place("right_rcm_peak_mm"));
         assert_eq!(made.task.cut_jaw, place("cut_jaw"));

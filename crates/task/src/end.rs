@@ -22,6 +22,11 @@ pub enum End {
         /// Why.
         why: String,
     },
+    /// What the task names as an abort came to be.
+    Aborted {
+        /// Its name.
+        name: String,
+    },
     /// The policy had nothing left to do, and not all stages are passed.
     Finished,
     /// The policy gave no action that could be done.
@@ -39,6 +44,7 @@ impl End {
             Self::TimeOut => "time-out",
             Self::RcmAbort { .. } => "rcm-abort",
             Self::Diverged { .. } => "diverged",
+            Self::Aborted { .. } => "aborted",
             Self::Finished => "finished",
             Self::PolicyError { .. } => "policy-error",
         }
@@ -54,6 +60,7 @@ impl std::fmt::Display for End {
                 write!(f, "the {arm} RCM deviation of {deviation_mm:.2} mm is where hardware stops")
             }
             Self::Diverged { why } => write!(f, "diverged: {why}"),
+            Self::Aborted { name } => write!(f, "aborted by the task: {name}"),
             Self::Finished => write!(f, "the policy had finished"),
             Self::PolicyError { why } => write!(f, "the policy failed: {why}"),
         }

@@ -2,14 +2,15 @@
 //! scored and what happened.
 
 use crate::facts::Facts;
-use crate::measure::Subject;
+use crate::measure::{Subject, bodies_of};
+use crate::measures::Measures;
 use crate::stages::Tracker;
 use crate::start::{starts, targets};
 use crate::supply::{OneSpecimen, SpecimenSupply};
 use crate::{Channels, End, Error, Observation, Progress, Result, Summary, specimen_hash};
 use std::sync::Arc;
 use trocar_cell::{Action, Cell, CellEvent, CellState, Settling};
-use trocar_scene::{Drawn, EpisodeRandom, Imaging, Scene, TaskName};
+use trocar_scene::{Drawn, EpisodeRandom, Imaging, Program, Scene, TaskName};
 use trocar_specimen::Specimen;
 use xxhash_rust::xxh3::Xxh3;
 
@@ -65,6 +66,7 @@ struct Built {
 /// An episode of a scene's task.
 pub struct Episode {
     scene: Scene,
+    program: Arc<Program>,
     supply: Box<dyn SpecimenSupply>,
     /// See [`key`].
     key: u64,
@@ -118,15 +120,17 @@ impl Episode {
         let arranged = scene.with_drawn(&drawn, &specimen);
         let key = key(scene, specimen_hash(&specimen))?;
         let (cell, built) = Built::new(foundation(scene, &arranged), specimen, threads)?;
+        let program = Arc::new(scene.program()?);
+        let task = &scene.task;
         let now = Now {
             seed,
-            subject: Subject::new(&cell, &scene.task.organ, &scene.task.gates, Vec::new()),
-            tracker: Tracker::new(scene.task.name, &scene.task.gates),
+            subject: Subject::new(&cell, &task.organ, &task.gates, Vec::new(), Measures::default()),
+            tracker: Tracker::new(Arc::clone(&program)),
             rows: Vec::new(),
             events: Vec::new(),
             end: None,
         };
-        let mut made = Self { scene: scene.clone(), supply, key, threads, built, cell, drawn, arranged, now };
+        let mut made = Self { scene: scene.clone(), program, supply, key, threads, built, cell, drawn, arranged, now };
         made.check()?;
         made.reset_with(seed, made.drawn.clone())?;
         Ok(made)
@@ -134,18 +138,24 @@ impl Episode {
 
     fn check(&self) -> Result<()> {
         let task = &self.scene.task;
-        let subject = &self.now.subject;
+        let (subject, program) = (&self.now.subject, &self.program);
         let missing = |what: &str| {
             Err(Error::Option(format!("scene '{}': task {} needs {what}", self.scene.name, task.name.name())))
         };
-        if task.needs_organ() && subject.bodies(&self.cell).is_empty() {
+        if program.needs_organ && subject.bodies(&self.cell).is_empty() {
             let known: Vec<&str> = self.cell.world().model.bodies().iter().map(|b| b.name()).collect();
             return missing(&format!("organ '{}'; the specimen has {}", task.organ, known.join(", ")));
         }
-        if task.needs_organ() && subject.grasper.is_none() {
+        for organ in program.organs() {
+            if bodies_of(&self.cell, organ).is_empty() {
+                let known: Vec<&str> = self.cell.world().model.bodies().iter().map(|b| b.name()).collect();
+                return missing(&format!("organ '{organ}'; the specimen has {}", known.join(", ")));
+            }
+        }
+        if program.needs_grasper && subject.grasper.is_none() {
             return missing("a grasper");
         }
-        if task.name == TaskName::AppendixResection && subject.cutter.is_none() {
+        if program.needs_cutter && subject.cutter.is_none() {
             return missing("a cutter");
         }
         Ok(())
@@ -171,14 +181,12 @@ impl Episode {
         let starts = starts(&self.arranged, &self.cell);
         self.cell.restart(&self.built.settled, &starts)?;
         let task = &self.scene.task;
-        let targets = match task.name {
-            TaskName::PortReach => targets(&self.cell, seed)?,
-            TaskName::AppendixResection | TaskName::GraspLift => Vec::new(),
-        };
+        let targets = if self.program.needs_targets { targets(&self.cell, seed)? } else { Vec::new() };
+        let measures = Measures::begin(&self.cell, &self.program.measures)?;
         self.now = Now {
             seed,
-            subject: Subject::new(&self.cell, &task.organ, &task.gates, targets),
-            tracker: Tracker::new(task.name, &task.gates),
+            subject: Subject::new(&self.cell, &task.organ, &task.gates, targets, measures),
+            tracker: Tracker::new(Arc::clone(&self.program)),
             rows: Vec::new(),
             events: Vec::new(),
             end: None,
@@ -232,13 +240,19 @@ impl Episode {
         let channels = self.now.subject.channels(&self.cell, &report)?;
         let abort = report.arms.iter().find(|a| a.rcm_over_abort);
         // Whoever leaves the port, or loses the tissue, passes nothing by it.
+        let mut aborted = None;
         if !channels.is_lost(Some(self.scene.safety.rcm_abort_mm)) {
-            self.now.tracker.update(&channels);
+            aborted = self.now.tracker.aborted(&channels);
+            if aborted.is_none() {
+                self.now.tracker.update(&channels);
+            }
         }
         self.now.end = if let Some(why) = report.tissue.divergence {
             Some(End::Diverged { why: why.to_string() })
         } else if let Some(arm) = abort {
             Some(End::RcmAbort { arm: arm.side.name().to_owned(), deviation_mm: 1e3 * arm.rcm_peak })
+        } else if let Some(name) = aborted {
+            Some(End::Aborted { name })
         } else if self.now.tracker.progress().passed() && self.scene.task.stop_when_passed {
             Some(End::Passed)
         } else if report.time >= self.scene.task.episode_s - 0.5 * self.cell.period() {
@@ -269,6 +283,11 @@ impl Episode {
     /// What a policy sees now.
     pub fn observe(&self) -> Observation {
         Observation::of(&self.cell.observe(), self.cell.time(), self.progress())
+    }
+
+    /// The task as it is judged.
+    pub fn program(&self) -> &Program {
+        &self.program
     }
 
     /// How far the task is.
@@ -372,6 +391,7 @@ impl Episode {
         let bodies = self.bodies();
         Facts {
             task: &self.scene.task,
+            program: &self.program,
             grasper: self.now.subject.grasper.map(|k| self.cell.arms()[k].0),
             jaw_force_n: grasper.map_or(0.0, |i| i.jaw_force_n),
             settling: self.built.settling,

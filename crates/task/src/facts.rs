@@ -5,7 +5,7 @@ use crate::Channels;
 use serde::{Deserialize, Serialize};
 use trocar_cell::blades::FRICTION;
 use trocar_cell::{CellEvent, Settling, Severance};
-use trocar_scene::{GraspDesignName, Side, Task};
+use trocar_scene::{GraspDesignName, Program, Side, Task};
 
 /// Figures that channels do not have.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -17,21 +17,21 @@ pub struct Details {
     pub design: String,
     /// Force of the grasper's jaws (N).
     pub jaw_force_n: f64,
-    /// Nodes that the last grasp held; 0 for friction.
-    pub held_nodes: usize,
+    /// Nodes that the last grasp held; 0 for friction. `None` without any grasp, like the next six.
+    pub held_nodes: Option<usize>,
     /// Gap between the blades when they closed on it (mm).
-    pub gap_mm: f64,
+    pub gap_mm: Option<f64>,
     /// Force with which tissue pushed the blades apart then (N).
-    pub closing_force_n: f64,
+    pub closing_force_n: Option<f64>,
     /// Largest distance between where the last grasp first prescribes a node and where it was (mm).
     /// Zero by construction for designs that capture nodes where they are.
-    pub snap_mm: f64,
+    pub snap_mm: Option<f64>,
     /// Mean of that distance over the nodes (mm).
-    pub snap_mean_mm: f64,
+    pub snap_mean_mm: Option<f64>,
     /// Largest motion of any node in the first frame of the last grasp (mm): what moved.
-    pub activation_step_mm: f64,
+    pub activation_step_mm: Option<f64>,
     /// Mean distance of the held nodes from their places at rest when the jaws closed (mm).
-    pub displaced_mm: f64,
+    pub displaced_mm: Option<f64>,
     /// Times that held tissue began to slide through the jaws.
     pub slipped: usize,
     /// Weight of the task's organ (N).
@@ -71,6 +71,7 @@ pub struct Severed {
 /// What details are made of.
 pub(crate) struct Facts<'a> {
     pub task: &'a Task,
+    pub program: &'a Program,
     /// The arm with the first grasper.
     pub grasper: Option<Side>,
     pub jaw_force_n: f64,
@@ -105,14 +106,17 @@ impl Facts<'_> {
             CellEvent::Attached { nodes, snap_mm, snap_mean_mm, displaced_mm, gap_mm, closing_force_n, .. },
         )) = self.events.iter().rfind(attached)
         {
-            details.held_nodes = *nodes;
-            (details.snap_mm, details.snap_mean_mm, details.displaced_mm) = (*snap_mm, *snap_mean_mm, *displaced_mm);
-            (details.gap_mm, details.closing_force_n) = (*gap_mm, *closing_force_n);
+            details.held_nodes = Some(*nodes);
+            details.snap_mm = Some(*snap_mm);
+            details.snap_mean_mm = Some(*snap_mean_mm);
+            details.displaced_mm = Some(*displaced_mm);
+            details.gap_mm = Some(*gap_mm);
+            details.closing_force_n = Some(*closing_force_n);
             // The first frame of the grasp lies in the period in which the jaws closed, or in the
             // next.
             let first = self.rows.iter().position(|c| c.time_s >= time - 1e-9).unwrap_or(self.rows.len());
             let steps = self.rows[first..].iter().take(2).map(|c| c.task.activation_step_mm);
-            details.activation_step_mm = steps.fold(0.0, f64::max);
+            details.activation_step_mm = Some(steps.fold(0.0, f64::max));
         }
         details
     }

@@ -1,13 +1,14 @@
 //! From a cell to a row of channels.
 
 use crate::channels::{ArmChannels, TaskChannels};
+use crate::measures::Measures;
 use crate::{Channels, Result};
 use glam::{DQuat, DVec3};
 use trocar_cell::{ArmObservation, Cell, CellEvent, CellReport};
 use trocar_scene::{Gates, InstrumentKind, Side};
 
 /// Middle of the region between the blades from the pivot (m).
-const MID_JAWS: f64 = 0.0115;
+pub(crate) const MID_JAWS: f64 = 0.0115;
 
 /// Jaw lift below which no follow ratio is told (m).
 const MIN_JAW_LIFT: f64 = 1e-4;
@@ -23,10 +24,12 @@ pub(crate) struct Subject {
     pub cutter: Option<usize>,
     /// Targets of port-reach: blade tips in the cell (m), three an arm; empty for other tasks.
     pub targets: Vec<[DVec3; 3]>,
+    /// What the task measures beside.
+    pub measures: Measures,
 }
 
 impl Subject {
-    pub fn new(cell: &Cell, organ: &str, gates: &Gates, targets: Vec<[DVec3; 3]>) -> Self {
+    pub fn new(cell: &Cell, organ: &str, gates: &Gates, targets: Vec<[DVec3; 3]>, measures: Measures) -> Self {
         let arms = cell.arms();
         let first = |kind| arms.iter().position(|(_, k)| *k == kind);
         Self {
@@ -35,15 +38,13 @@ impl Subject {
             grasper: first(InstrumentKind::Grasper),
             cutter: first(InstrumentKind::Cutter),
             targets,
+            measures,
         }
     }
 
     /// The bodies that the organ is in.
     pub fn bodies(&self, cell: &Cell) -> Vec<usize> {
-        let is =
-            |name: &str| name.strip_prefix(&self.organ).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-        let bodies = cell.world().model.bodies().iter().enumerate();
-        bodies.filter(|(_, b)| is(b.name())).map(|(k, _)| k).collect()
+        bodies_of(cell, &self.organ)
     }
 
     /// The row of a period that `report` tells of.
@@ -58,6 +59,7 @@ impl Subject {
             }
         }
         row.task = self.task(cell, report, &bodies)?;
+        self.measures.measure(cell, &mut row)?;
         Ok(row)
     }
 
@@ -130,7 +132,14 @@ impl Subject {
     }
 }
 
-fn flag(is: bool) -> f64 {
+/// The bodies that an organ is in: its pieces after a cut are called `name.1` and so on.
+pub(crate) fn bodies_of(cell: &Cell, organ: &str) -> Vec<usize> {
+    let is = |name: &str| name.strip_prefix(organ).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+    let bodies = cell.world().model.bodies().iter().enumerate();
+    bodies.filter(|(_, b)| is(b.name())).map(|(k, _)| k).collect()
+}
+
+pub(crate) fn flag(is: bool) -> f64 {
     f64::from(u8::from(is))
 }
 
@@ -140,7 +149,7 @@ pub(crate) fn upright(q: DQuat) -> DQuat {
 }
 
 /// Distance from `p` to the nearest node of a body among those `of` (m); infinite without any.
-fn nearest(cell: &Cell, body: usize, p: DVec3, of: impl Fn(usize) -> bool) -> f64 {
+pub(crate) fn nearest(cell: &Cell, body: usize, p: DVec3, of: impl Fn(usize) -> bool) -> f64 {
     let world = cell.world();
     let count = world.model.bodies()[body].len();
     let square = |i: usize| world.state.position(&world.model, body, i).distance_squared(p);
@@ -149,7 +158,7 @@ fn nearest(cell: &Cell, body: usize, p: DVec3, of: impl Fn(usize) -> bool) -> f6
 
 /// Whether any of `bodies` is between the blades of arm `k`, and the share of the wedge that they
 /// fill.
-fn between_blades(cell: &Cell, k: usize, bodies: &[usize]) -> (bool, f64) {
+pub(crate) fn between_blades(cell: &Cell, k: usize, bodies: &[usize]) -> (bool, f64) {
     let all: Vec<f64> = bodies.iter().filter_map(|body| Some(cell.between_blades(k, *body)?.1)).collect();
     (!all.is_empty(), all.iter().sum::<f64>().min(1.0))
 }

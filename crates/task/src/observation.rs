@@ -5,7 +5,7 @@ use crate::{Channels, Progress};
 use serde::Serialize;
 use trocar_cell::ArmObservation;
 use trocar_robot::wrench::ForceKind;
-use trocar_scene::Side;
+use trocar_scene::{Program, Side};
 
 /// What is seen of one arm; all zero where the scene has no such arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -143,9 +143,11 @@ impl Observation {
     }
 }
 
-/// Privileged figures of a step, for `info` alone: the channels by name.
-pub fn privileged(row: &Channels) -> Vec<(String, f64)> {
-    Channels::names().into_iter().zip(row.to_row()).collect()
+/// Privileged figures of a step, for `info` alone: the channels and what `program` measures beside,
+/// by name.
+pub fn privileged(row: &Channels, program: &Program) -> Vec<(String, f64)> {
+    let measures = program.measures.iter().map(ToString::to_string).zip(row.measures);
+    Channels::names().into_iter().zip(row.to_row()).chain(measures).collect()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! What a task asks for, in words: for policies that read.
 
-use trocar_scene::{InstrumentKind, Scene, TaskName};
+use trocar_scene::{InstrumentKind, Scene};
 
 /// What the task of `scene` asks for, with the arms that hold the first grasper and the first
 /// cutter in it by their sides.
@@ -8,26 +8,26 @@ use trocar_scene::{InstrumentKind, Scene, TaskName};
 /// This is the `prompt` that policies are shown, the `task_description` of Python's environments
 /// and the task in datasets.
 pub fn prompt(scene: &Scene) -> String {
-    let organ = &scene.task.organ;
     let with = |kind: InstrumentKind| match scene.arm_with(kind) {
         Some(arm) => format!("the {} instrument", arm.name.name()),
         None => "an instrument".to_owned(),
     };
-    let grasper = with(InstrumentKind::Grasper);
-    match scene.task.name {
-        TaskName::AppendixResection => {
-            let cutter = with(InstrumentKind::Cutter);
-            format!("grasp the {organ} with {grasper}, lift it, and close {cutter}'s blades through it")
-        }
-        TaskName::GraspLift => format!("grasp the {organ} with {grasper}, lift it and hold it"),
-        TaskName::PortReach => "move the instruments through their ports to one place after the other".to_owned(),
+    let definition = scene.task.definition().unwrap_or_default();
+    if definition.prompt.is_empty() {
+        let stages: Vec<&str> = definition.stages.iter().map(|s| s.name.as_str()).collect();
+        return format!("{}: {}", scene.task.name.name(), stages.join(", "));
     }
+    definition
+        .prompt
+        .replace("{organ}", &scene.task.organ)
+        .replace("{grasper}", &with(InstrumentKind::Grasper))
+        .replace("{cutter}", &with(InstrumentKind::Cutter))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use trocar_scene::Side;
+    use trocar_scene::{Side, TaskName};
 
     #[test]
     fn the_arms_are_those_that_hold_the_instruments() {

@@ -35,7 +35,7 @@ pub struct EpisodeResult {
     /// Name of the scene.
     pub scene: String,
     /// Name of the task.
-    pub task: &'static str,
+    pub task: String,
     /// Name of the policy.
     pub policy: String,
     /// The seed.
@@ -132,6 +132,7 @@ pub fn run_watched(
         scene: scene.name.clone(),
         task: scene.task.name,
         gates: scene.task.gates,
+        context: Some(scene.task_context()?),
         rcm_threshold_mm: scene.safety.rcm_threshold_mm,
         rcm_abort_mm: Some(scene.safety.rcm_abort_mm),
         arms: episode.cell().arms().iter().map(|(side, _)| side.name().to_owned()).collect(),
@@ -154,7 +155,7 @@ impl Recording {
         let last = self.file.steps.last().map(|(_, hash)| format!("{hash:016x}"));
         EpisodeResult {
             scene: self.info.scene.clone(),
-            task: self.info.task.name(),
+            task: self.info.task.name().to_owned(),
             policy: self.info.policy.clone(),
             seed: self.info.seed,
             state_hash: last.unwrap_or_else(|| self.file.header.start_hash.clone()),

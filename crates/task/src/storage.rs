@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
-use trocar_scene::{Gates, TaskName};
+use trocar_scene::{BuiltinTask, Gates, InstrumentKind, Program, Side, TaskContext, TaskName};
 use xxhash_rust::xxh3::Xxh3;
 
 /// The key of [`ChannelsInfo`] in the file's metadata.
@@ -47,6 +47,10 @@ pub struct ChannelsInfo {
     pub task: TaskName,
     /// Its gates.
     pub gates: Gates,
+    /// What the task's expressions are about; `None` in files that were written before tasks were
+    /// files, which are of built-in tasks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub context: Option<TaskContext>,
     /// RCM deviation that episodes are scored against (mm).
     pub rcm_threshold_mm: f64,
     /// RCM deviation beyond which an episode is lost (mm); None in files that were written before
@@ -73,6 +77,26 @@ struct Stored {
     info: ChannelsInfo,
 }
 
+impl ChannelsInfo {
+    /// The task, ready to be judged.
+    ///
+    /// # Errors
+    /// A task that is none.
+    pub fn program(&self) -> Result<Program> {
+        let builtin = || -> Result<TaskContext> {
+            let task = BuiltinTask::named(self.task);
+            let task = task.ok_or_else(|| Error::Option(format!("no built-in task '{}'", self.task.name())))?;
+            let arms = vec![(Side::Left, InstrumentKind::Grasper), (Side::Right, InstrumentKind::Cutter)];
+            Ok(TaskContext { definition: task.definition()?, arms, ..TaskContext::default() })
+        };
+        let context = match &self.context {
+            Some(context) => context.clone(),
+            None => builtin()?,
+        };
+        context.program(&self.gates).map_err(|m| Error::Option(format!("task.{}{}", m.field, m.reason)))
+    }
+}
+
 /// Writes rows to `path`, whole or not at all.
 ///
 /// # Errors
@@ -93,14 +117,21 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
 
 fn encode(info: &ChannelsInfo, rows: &[Channels]) -> std::result::Result<Vec<u8>, String> {
     let failed = |e: parquet::errors::ParquetError| format!("cannot be written: {e}");
-    let names = Channels::names();
+    let measures = info.program().map_err(|e| e.to_string())?.measures;
+    let mut names = Channels::names();
+    names.extend(measures.iter().map(ToString::to_string));
     let field = |name: &String| {
         let made = Type::primitive_type_builder(name, Physical::DOUBLE).with_repetition(Repetition::REQUIRED).build();
         made.map(Arc::new)
     };
     let fields = names.iter().map(field).collect::<std::result::Result<_, _>>().map_err(failed)?;
     let schema = Type::group_type_builder("channels").with_fields(fields).build().map_err(failed)?;
-    let table: Vec<Vec<f64>> = rows.iter().map(Channels::to_row).collect();
+    let row = |c: &Channels| {
+        let mut row = c.to_row();
+        row.extend(&c.measures[..measures.len()]);
+        row
+    };
+    let table: Vec<Vec<f64>> = rows.iter().map(row).collect();
     let stored = Stored {
         format: FORMAT.to_owned(),
         version: VERSION,
@@ -173,7 +204,8 @@ fn decode(file: std::fs::File) -> std::result::Result<(ChannelsInfo, Vec<Channel
     let columns = metadata.file_metadata().schema_descr().columns();
     let mut table = vec![Vec::with_capacity(Channels::COUNT); count];
     let mut sum = vec![Vec::new(); count];
-    for name in Channels::names() {
+    let measures = stored.info.program().map_err(|e| e.to_string())?.measures;
+    for name in Channels::names().into_iter().chain(measures.iter().map(ToString::to_string)) {
         let name = if stored.version == 1 { name_in_version_1(&name) } else { Some(name) };
         let Some(name) = name else {
             table.iter_mut().for_each(|row| row.push(0.0));
@@ -201,7 +233,13 @@ fn decode(file: std::fs::File) -> std::result::Result<(ChannelsInfo, Vec<Channel
         sum.iter_mut().zip(&values).for_each(|(row, value)| row.push(*value));
         table.iter_mut().zip(values).for_each(|(row, value)| row.push(value));
     }
-    let rows: Option<Vec<Channels>> = table.iter().map(|row| Channels::from_row(row)).collect();
+    let made = |row: &Vec<f64>| {
+        let (channels, measured) = row.split_at_checked(Channels::COUNT)?;
+        let mut made = Channels::from_row(channels)?;
+        made.measures.get_mut(..measured.len())?.copy_from_slice(measured);
+        Some(made)
+    };
+    let rows: Option<Vec<Channels>> = table.iter().map(made).collect();
     let rows = rows.ok_or("has rows that are no channels")?;
     let found = format!("{:016x}", hash(&sum));
     if found != stored.hash {

@@ -5,7 +5,7 @@ use crate::channels::{ArmChannels, TaskChannels};
 use crate::facts::{Details, Facts};
 use crate::stages::{HELD_FOLLOW, HELD_SLIP_MM};
 use crate::why::why;
-use crate::{Channels, End, Progress, Stage};
+use crate::{Channels, End, Progress};
 use serde::{Deserialize, Serialize};
 use trocar_scene::Drawn;
 
@@ -83,8 +83,8 @@ pub struct Summary {
     pub grasp_at: Option<f64>,
     /// It held it at the end too.
     pub held_to_end: bool,
-    /// Greatest rise of held tissue (mm).
-    pub lift_mm: f64,
+    /// Greatest rise of held tissue (mm). `None` without any grasp.
+    pub lift_mm: Option<f64>,
     /// Slip at the top of the last grasp (mm): when its jaws were last within 5% of their greatest
     /// lift. `None` without any grasp, like the next.
     pub slip_mm: Option<f64>,
@@ -161,7 +161,7 @@ impl Summary {
             attached: held.is_some(),
             grasp_at: tasks().find(|t| t.grasped > 0.0).map(|t| t.grasp_s),
             held_to_end: rows.last().is_some_and(|c| c.task.grasped > 0.0),
-            lift_mm: most(|c| c.task.lift_mm),
+            lift_mm: held.is_some().then(|| most(|c| c.task.lift_mm)),
             slip_mm: top.map(|t| finite(t.slip_mm)),
             follow_ratio: top.map(|t| finite(t.follow)),
             held: top.is_some_and(|t| t.follow >= HELD_FOLLOW && t.slip_mm < HELD_SLIP_MM),
@@ -210,8 +210,8 @@ impl Summary {
         (!all.is_empty()).then(|| all.join(", "))
     }
 
-    /// When `stage` passed (s).
-    pub fn passed_at(&self, stage: Stage) -> Option<f64> {
+    /// When the stage of that name passed (s).
+    pub fn passed_at(&self, stage: &str) -> Option<f64> {
         self.progress.stages.iter().find(|s| s.stage == stage).and_then(|s| s.time_s)
     }
 }
@@ -333,10 +333,9 @@ mod tests {
         let loaded = arm("left", &loaded);
         assert_eq!((loaded.rcm_median_mm, loaded.rcm_max_mm), (Some(0.0), Some(0.0)));
         assert_eq!((loaded.tracking_rms_mm, loaded.lag_ms, loaded.lagged_rms_mm), (None, None, None));
-        let progress =
-            crate::Tracker::new(trocar_scene::TaskName::GraspLift, &trocar_scene::Gates::default()).progress().clone();
+        let progress = Progress { stage: 0, stages: Vec::new() };
         let summary = Summary::of(&rows, &progress, None, &["left"], 3.0);
-        assert_eq!((summary.slip_mm, summary.follow_ratio), (None, None));
+        assert_eq!((summary.lift_mm, summary.slip_mm, summary.follow_ratio), (None, None, None));
         let json = serde_json::to_value(&summary).unwrap();
         assert!(json["slip_mm"].is_null() && json["arms"][0]["rcm_median_mm"].is_null(), "{json}");
     }

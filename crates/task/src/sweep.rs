@@ -4,10 +4,11 @@
 //! more of it than there was: a count at a stricter gate is what is shown, not what might have
 //! been.
 
-use crate::stages::{Tracker, with_gate};
+use crate::stages::{Tracker, set_gate};
 use crate::storage::ChannelsInfo;
-use crate::{Channels, Error, Result, Stage};
+use crate::{Channels, Error, Result};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 use trocar_scene::TaskName;
 
 /// Steps of a range that says none.
@@ -61,7 +62,6 @@ impl GateRange {
         if values.is_empty() || values.len() > MOST_VALUES {
             return Err(wrong("has no value, or more than 1000"));
         }
-        with_gate(trocar_scene::Gates::default(), gate.trim(), values[0])?;
         Ok(Self { gate: gate.trim().to_owned(), values })
     }
 }
@@ -85,7 +85,7 @@ pub struct Sweep {
     /// The task.
     pub task: TaskName,
     /// Its stages.
-    pub stages: Vec<Stage>,
+    pub stages: Vec<String>,
     /// Episodes.
     pub episodes: usize,
     /// The gates that were swept; all others are each episode's own.
@@ -119,7 +119,18 @@ pub fn sweep(
     let count = ranges.iter().try_fold(1_usize, |n, r| n.checked_mul(r.values.len()).filter(|n| *n <= MOST_ROWS));
     let count =
         count.ok_or_else(|| Error::Option(format!("more than {MOST_ROWS} combinations; sweep fewer values")))?;
-    let stages = Stage::of(task);
+    let programs = episodes.iter().map(|(info, _)| info.program()).collect::<Result<Vec<_>>>()?;
+    let stages: Vec<String> = programs[0].stages.iter().map(|s| s.name.clone()).collect();
+    for (program, (info, _)) in programs.iter().zip(episodes) {
+        if !program.stages.iter().map(|s| &s.name).eq(&stages) {
+            let (task, policy, seed) = (info.task.name(), &info.policy, info.seed);
+            let what = format!("episode {seed} by {policy} has other stages of {task} than the first");
+            return Err(Error::Option(format!("{what}; sweep one task at a time")));
+        }
+    }
+    for range in ranges {
+        set_gate(&mut programs[0].clone(), &range.gate, range.values.first().copied().unwrap_or(f64::NAN))?;
+    }
     let mut rows = Vec::with_capacity(count);
     for k in 0..count {
         if !watch() {
@@ -132,18 +143,18 @@ pub fn sweep(
             rest /= range.values.len();
         }
         let mut passed = Vec::with_capacity(episodes.len());
-        for (info, channels) in episodes {
-            let mut gates = info.gates;
+        for ((info, channels), program) in episodes.iter().zip(&programs) {
+            let mut program = program.clone();
             for (range, value) in ranges.iter().zip(&values) {
-                gates = with_gate(gates, &range.gate, *value)?;
+                set_gate(&mut program, &range.gate, *value)?;
             }
             let sound = channels.iter().position(|c| c.is_lost(info.rcm_abort_mm)).unwrap_or(channels.len());
-            passed.push(Tracker::of(task, &gates, &channels[..sound]).stage);
+            passed.push(Tracker::of(Arc::new(program), &channels[..sound]).stage);
         }
         let by_stage = (1..=stages.len()).map(|n| passed.iter().filter(|p| **p >= n).count()).collect();
         let all = passed.iter().filter(|p| **p == stages.len()).count();
         rows.push(SweepRow { values, passed: all, by_stage, stages: passed });
     }
     let gates = ranges.iter().map(|r| r.gate.clone()).collect();
-    Ok(Sweep { task, stages: stages.to_vec(), episodes: episodes.len(), gates, rows })
+    Ok(Sweep { task, stages, episodes: episodes.len(), gates, rows })
 }

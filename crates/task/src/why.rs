@@ -1,7 +1,8 @@
 //! Why an episode did not pass, in one line.
 
 use crate::facts::Facts;
-use crate::{Channels, End, Progress, Stage};
+use crate::judge::Sight;
+use crate::{Channels, End, Progress};
 use trocar_cell::CellEvent;
 use trocar_scene::Side;
 
@@ -15,11 +16,10 @@ const OUT_OF_REACH_MM: f64 = 10.0;
 pub(crate) fn why(rows: &[Channels], facts: &Facts<'_>, progress: &Progress, end: Option<&End>) -> Option<String> {
     match end? {
         End::Passed => None,
-        End::RcmAbort { .. } | End::Diverged { .. } | End::PolicyError { .. } => Some(end?.to_string()),
-        End::TimeOut | End::Finished => {
-            let stage = progress.stages.get(progress.stage)?.stage;
-            Some(Reason { rows, facts }.of(stage))
+        End::RcmAbort { .. } | End::Diverged { .. } | End::Aborted { .. } | End::PolicyError { .. } => {
+            Some(end?.to_string())
         }
+        End::TimeOut | End::Finished => Some(Reason { rows, facts }.of(progress.next()?)),
     }
 }
 
@@ -29,44 +29,21 @@ struct Reason<'a, 'b> {
 }
 
 impl Reason<'_, '_> {
-    fn of(&self, stage: Stage) -> String {
-        let (task, organ) = (&self.facts.task.gates, &self.facts.task.organ);
-        let last = self.rows.last().map(|c| c.task).unwrap_or_default();
-        let least = |of: fn(&Channels) -> f64| self.rows.iter().map(of).fold(f64::INFINITY, f64::min);
-        match stage {
-            Stage::Grasp => self.no_grasp(),
-            Stage::Lift | Stage::Held if last.grasped == 0.0 => self.lost_grasp(),
-            Stage::Lift => format!(
-                "not lifted: the {organ} rose by {:.1} mm at most, {} mm are needed for {} s",
-                self.rows.iter().map(|c| c.task.lift_mm).fold(0.0, f64::max),
-                task.lift_mm,
-                task.lift_s
-            ),
-            Stage::Held => format!(
-                "slipped: tissue followed {:.0}% of the jaws' lift and slid {:.1} mm in them",
-                1e2 * last.follow,
-                last.slip_mm
-            ),
-            Stage::Positioning | Stage::JawOnTissue | Stage::Cut if last.grasped == 0.0 => self.lost_grasp(),
-            Stage::Positioning => format!(
-                "out of reach: the cutter came no nearer than {:.1} mm to the {organ} between grasp and base; {} mm are needed",
-                least(|c| c.task.position_mm),
-                task.positioning_mm
-            ),
-            Stage::JawOnTissue => format!("empty jaws: nothing of the {organ} came between the cutter's blades"),
-            Stage::Cut => {
-                format!("not cut: the blades did not open and then close with the {organ} between them all the while")
+    /// Why the stage at `place` did not pass. Of a grasp that is needed and is not there more is
+    /// known than a hint can say.
+    fn of(&self, place: usize) -> String {
+        let program = self.facts.program;
+        let Some(stage) = program.stages.get(place) else { return String::new() };
+        let last = self.rows.last().copied().unwrap_or_default();
+        if stage.needs_grasp {
+            if !program.stages[..place].iter().any(|s| s.needs_grasp) {
+                return self.no_grasp();
             }
-            Stage::Reach1 => {
-                format!("out of reach: the first target stayed {:.1} mm away", least(|c| c.task.reach_1_mm))
-            }
-            Stage::Reach2 => {
-                format!("out of reach: the second target stayed {:.1} mm away", least(|c| c.task.reach_2_mm))
-            }
-            Stage::Reach3 => {
-                format!("out of reach: the third target stayed {:.1} mm away", least(|c| c.task.reach_3_mm))
+            if last.task.grasped == 0.0 {
+                return self.lost_grasp();
             }
         }
+        Sight { row: &last, rows: self.rows, constants: &program.constants }.said(&stage.hint)
     }
 
     /// The jaws never held the organ where the gate wants it.

@@ -2,9 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-use trocar_scene::{Gates, TaskName};
+use std::sync::Arc;
+use trocar_scene::{Gates, Program, TaskName};
 use trocar_task::stages::{self, HELD_FOLLOW, HELD_SLIP_MM};
-use trocar_task::{Channels, ChannelsInfo, End, GateRange, Progress, Stage, Summary, Tracker, sweep};
+use trocar_task::{Channels, ChannelsInfo, End, GateRange, Progress, Summary, Tracker, sweep};
 
 const PERIOD: f64 = 1.0 / 30.0;
 
@@ -36,8 +37,26 @@ fn good() -> Vec<Channels> {
     rows
 }
 
+fn info(task: TaskName, gates: Gates) -> ChannelsInfo {
+    ChannelsInfo {
+        scene: "cell-a".into(),
+        task,
+        gates,
+        context: None,
+        rcm_threshold_mm: 3.0,
+        rcm_abort_mm: Some(5.0),
+        arms: vec!["left".into(), "right".into()],
+        policy: "none".into(),
+        seed: 1,
+    }
+}
+
+fn program(task: TaskName, gates: Gates) -> Arc<Program> {
+    Arc::new(info(task, gates).program().unwrap())
+}
+
 fn judge(rows: &[Channels], gates: &Gates) -> Progress {
-    Tracker::of(TaskName::AppendixResection, gates, rows)
+    Tracker::of(program(TaskName::AppendixResection, *gates), rows)
 }
 
 fn changed(change: impl Fn(usize, &mut Channels)) -> usize {
@@ -95,7 +114,7 @@ fn other_tasks_have_their_own() {
         (t.reach_2_mm, t.reach_3_mm) = (2.0, if k > 40 { 1.9 } else { 2.1 });
         rows.push(c);
     }
-    let judged = |task, rows: &[Channels]| Tracker::of(task, &Gates::default(), rows);
+    let judged = |task, rows: &[Channels]| Tracker::of(program(task, Gates::default()), rows);
     assert!(judged(TaskName::GraspLift, &rows).passed());
     assert!(judged(TaskName::PortReach, &rows).passed());
     let mut slipped = rows.clone();
@@ -105,14 +124,13 @@ fn other_tasks_have_their_own() {
     left_behind.iter_mut().for_each(|c| c.task.follow = 0.99 * HELD_FOLLOW);
     assert_eq!(judged(TaskName::GraspLift, &left_behind).stage, 2);
     assert_eq!(judged(TaskName::PortReach, &rows[..43]).stage, 2);
-    assert_eq!(Stage::of(TaskName::AppendixResection).len(), 5);
 }
 
 #[test]
 fn shares_grow_on_the_way_and_only_what_passed_is_one() {
     let rows = good();
     let mut last = 0.0;
-    let mut tracker = Tracker::new(TaskName::AppendixResection, &Gates::default());
+    let mut tracker = Tracker::new(program(TaskName::AppendixResection, Gates::default()));
     for c in &rows {
         tracker.update(c);
         let p = tracker.progress();
@@ -125,16 +143,7 @@ fn shares_grow_on_the_way_and_only_what_passed_is_one() {
 
 #[test]
 fn sweeps_agree_with_the_gates_and_refuse_what_is_none() {
-    let info = ChannelsInfo {
-        scene: "cell-a".into(),
-        task: TaskName::AppendixResection,
-        gates: Gates::default(),
-        rcm_threshold_mm: 3.0,
-        rcm_abort_mm: Some(5.0),
-        arms: vec!["left".into(), "right".into()],
-        policy: "none".into(),
-        seed: 1,
-    };
+    let info = info(TaskName::AppendixResection, Gates::default());
     let episodes = vec![(info.clone(), good()), (info.clone(), good()[..20].to_vec())];
     let ranges = [GateRange::parse("lift_mm=4..12").unwrap(), GateRange::parse("cut_closed=0.10,0.15,0.5").unwrap()];
     let swept = sweep(&episodes, &ranges, &mut || true).unwrap();
@@ -148,7 +157,7 @@ fn sweeps_agree_with_the_gates_and_refuse_what_is_none() {
         assert_eq!(row.passed, usize::from(row.values[0] <= 8.0 && row.values[1] >= 0.15), "{row:?}");
     }
     assert_eq!(GateRange::parse("lift_mm=4..6:0.5").unwrap().values, [4.0, 4.5, 5.0, 5.5, 6.0]);
-    for bad in ["lift_mm", "lift=4..12", "lift_mm=12..4", "lift_mm=a", "lift_mm=0..1:1e-9", "lift_mm=1..inf"] {
+    for bad in ["lift_mm", "lift_mm=12..4", "lift_mm=a", "lift_mm=0..1:1e-9", "lift_mm=1..inf"] {
         assert!(GateRange::parse(bad).is_err(), "{bad}");
     }
     let other = ChannelsInfo { task: TaskName::GraspLift, ..info.clone() };
@@ -178,5 +187,9 @@ fn sweeps_agree_with_the_gates_and_refuse_what_is_none() {
         left > 0
     });
     assert_eq!((stopped.unwrap_err().to_string(), left), (trocar_cell::Error::Interrupted.to_string(), 0));
-    assert!(stages::with_gate(Gates::default(), "lift_mm", f64::NAN).is_err());
+    let mut program = info.program().unwrap();
+    assert!(stages::set_gate(&mut program, "lift_mm", f64::NAN).is_err());
+    let unknown = [GateRange::parse("lift=4..12").unwrap()];
+    let said = sweep(&episodes, &unknown, &mut || true).unwrap_err().to_string();
+    assert!(said.starts_with("no gate 'lift'; there are grasp_from,"), "{said}");
 }

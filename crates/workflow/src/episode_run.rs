@@ -68,7 +68,7 @@ impl EpisodeRun {
     /// # Errors
     /// A scene that cannot be read; a folder with other contents.
     pub fn check(&self, output: &Path) -> Result<Scene> {
-        let scene = read_varied(&self.scene, self.variation)?;
+        let scene = read_varied(&self.scene, self.variation, VariationSet::None)?;
         refuse_overlap(Path::new(&self.scene), output)?;
         // The staged folder is removed when it is dropped.
         StagedFolder::create(output, RESULT_FILE)?;
@@ -120,14 +120,16 @@ impl EpisodeRun {
     }
 }
 
-/// The scene at `path` or of that name, with the set `variation` instead of its own.
+/// The scene at `path` or of that name, with the set `variation` instead of its own. Without one, a
+/// scene that has no set varies by `default`.
 ///
 /// # Errors
 /// A scene that cannot be read, or that the set does not suit.
-pub fn read_varied(path: &str, variation: Option<VariationSet>) -> Result<Scene> {
+pub fn read_varied(path: &str, variation: Option<VariationSet>, default: VariationSet) -> Result<Scene> {
     let mut scene = Scene::read(path)?;
-    if let Some(set) = variation {
-        scene.variation.set = set;
+    let chosen = scene.variation.chosen(variation, default);
+    if chosen != scene.variation {
+        scene.variation = chosen;
         scene.validate()?;
     }
     Ok(scene)

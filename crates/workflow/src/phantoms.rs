@@ -4,7 +4,7 @@ use crate::reconstruct::reconstruct_recording;
 use crate::{Error, Result};
 use std::fs::File;
 use std::io::ErrorKind;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
 use trocar_reconstruct::Settings;
@@ -73,6 +73,20 @@ pub fn scene_specimen(scene: &Scene, phantoms: &Path, progress: &dyn Progress) -
     source_specimen(&scene.specimen, &scene.folder, phantoms, progress)
 }
 
+/// The folder in which a phantom is kept.
+fn kept_in(phantoms: &Path, name: &str, seed: u32) -> PathBuf {
+    phantoms.join(format!("{name}-{seed}"))
+}
+
+/// Whether the specimen that `source` names is there: a folder, or a phantom that some program has
+/// made in the folder `phantoms`.
+pub fn is_made(source: &SpecimenSource, phantoms: &Path) -> bool {
+    match source.source() {
+        Some(Source::Phantom(name, seed)) => kept_in(phantoms, name, seed).join(STAMP).is_file(),
+        Some(Source::Folder(_)) | None => true,
+    }
+}
+
 /// The specimen that `source` names: from its folder, whose path starts from `folder`, or of its
 /// phantom, which is made once in the folder `phantoms` and kept.
 ///
@@ -88,7 +102,7 @@ pub fn source_specimen(
         Some(Source::Folder(path)) => Ok(Specimen::read(&folder.join(path))?),
         Some(Source::Phantom(name, seed)) => {
             let options = RecordOptions { frames: FRAMES, seed: u64::from(seed), ..RecordOptions::default() };
-            specimen(name, &options, &phantoms.join(format!("{name}-{seed}")), progress)
+            specimen(name, &options, &kept_in(phantoms, name, seed), progress)
         }
         None => Err(Error::Mismatch("the scene names neither a specimen folder nor a phantom".to_owned())),
     }

@@ -99,7 +99,7 @@ impl Recorder {
                 _ => {}
             }
         }
-        if !self.lifted && step.progress.stage >= 2 {
+        if !self.lifted && step.progress.stages.iter().any(|s| s.stage == "lift" && s.passed) {
             self.lifted = true;
             self.still(cell, "Lifted")?;
         }

@@ -1,6 +1,6 @@
 //! The specimens of a scene's episodes: read from their folders, or made of phantoms and kept.
 
-use crate::phantoms::source_specimen;
+use crate::phantoms::{is_made, source_specimen};
 use crate::{Error, Result};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -58,7 +58,13 @@ impl SpecimenCache {
             [one] => return self.read(one, progress).map(drop),
             _ => {}
         }
-        progress.begin("specimens", sources.len() as u64);
+        // Progress names what takes minutes, and not what is read in moments.
+        let missing = sources.iter().filter(|source| !self.is_made(source)).count();
+        let stage = match missing {
+            0 => "specimens".to_owned(),
+            n => format!("specimens ({n} new, about a minute each)"),
+        };
+        progress.begin(&stage, sources.len() as u64);
         for source in sources {
             if progress.interrupted() {
                 return Err(Error::Interrupted);
@@ -68,6 +74,12 @@ impl SpecimenCache {
         }
         progress.end();
         Ok(())
+    }
+
+    /// Whether the specimen that `source` names need not be made: it is a folder, or its phantom has
+    /// been made.
+    pub fn is_made(&self, source: &SpecimenSource) -> bool {
+        is_made(source, &self.phantoms)
     }
 
     fn kept(&self, source: &SpecimenSource) -> Option<Arc<Specimen>> {

@@ -28,8 +28,14 @@ one. Both take these options:
 - `episode_s`: maximum duration of an episode (s) (default: the scene's).
 - `threads`: 0 for one a core, at most 1024. Results do not depend on it.
 - `privileged`: `info["channels"]` holds the privileged channels.
+- `variation`: what the seed of an episode draws: `none`, `easy`, `standard` or `hard` (default: the
+  set of the scene, or `standard` if it has none). The anatomies of a set are made once, about a
+  minute each; `none` is the fixed cell of the scene.
+- `split`: `seen` (default) for episodes to train on, `unseen` for episodes that are kept apart,
+  with anatomies of their own, or `both`. The seed of an episode decides its split: unseen ones
+  have seeds from 1,000,000 on. A seed of another split is a ValueError.
 
-`gym.make` returns a `TrocarEnv` without wrappers. Seeds are in [0, 2^63 - 1]. An environment
+`gym.make` returns a `TrocarEnv` without wrappers. Seeds are at most 2^63 - 1. An environment
 belongs to the process that made it: a child made by `fork` gets a RuntimeError and must make its
 own.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,9 +13,9 @@ import gymnasium as gym
 import numpy as np
 
 from .._native import Cells as NativeCells
-from .._native import State, phantoms_folder
+from .._native import State, missing_specimens, phantoms_folder
 from .._native import cameras as scene_cameras
-from .options import Options, checked_int, checked_size, kinds_of
+from .options import Options, checked_int, checked_size, checked_split, kinds_of
 
 __all__ = ["Cells", "Options", "SavedState", "phantoms_folder"]
 
@@ -64,13 +65,24 @@ class Cells:
         cameras: Sequence[str] | None = None,
         image_size: tuple[int, int] | None = None,
         sensor_noise: bool = False,
+        variation: str | None = None,
+        split: str = "seen",
     ):
+        self.split = checked_split(split)
         self.kinds, self.in_dict = kinds_of(obs)
         count = checked_int("num_envs", count, 1, MAX_CELLS)
         threads = checked_int("threads", threads, 0, MAX_THREADS)
         self._choose_cameras(scene, cameras, checked_size(image_size))
         folder = phantoms_folder()
         folder.mkdir(parents=True, exist_ok=True)
+        missing = missing_specimens(scene, variation, split, folder)
+        if missing > 1:
+            logging.getLogger("trocar").warning(
+                "making %d anatomies in %s, about a minute each; later environments use them "
+                "again, and variation='none' needs only one",
+                missing,
+                folder,
+            )
         native = NativeCells(
             scene,
             count,
@@ -80,6 +92,8 @@ class Cells:
             actions=actions,
             episode_s=episode_s,
             sensor_noise=sensor_noise,
+            variation=variation,
+            split=split,
         )
         self._native: NativeCells | None = native
         self.count, self.privileged, self.normalize = count, privileged, normalize

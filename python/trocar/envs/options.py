@@ -17,6 +17,15 @@ KINDS = ("state", "agent_pos", "rgb", "depth")
 #: Greatest seed: arrays of seeds in `infos` are signed 64-bit integers.
 MAX_SEED = 2**63 - 1
 
+#: The first seed of unseen episodes: the seed of an episode decides its split.
+FIRST_UNSEEN = 1_000_000
+#: Least and greatest seed of a split.
+SPLITS = {
+    "seen": (0, FIRST_UNSEEN - 1),
+    "unseen": (FIRST_UNSEEN, MAX_SEED),
+    "both": (0, MAX_SEED),
+}
+
 #: Range of the edges of a picture (px).
 MIN_IMAGE_PX, MAX_IMAGE_PX = 8, 8192
 
@@ -34,6 +43,8 @@ class Options(TypedDict, total=False):
     cameras: Sequence[str] | None
     image_size: tuple[int, int] | None
     sensor_noise: bool
+    variation: str | None
+    split: str
 
 
 def checked_int(name: str, value: Any, low: int, high: int) -> int:
@@ -47,9 +58,27 @@ def checked_int(name: str, value: Any, low: int, high: int) -> int:
     return number
 
 
-def checked_seed(value: Any) -> int:
-    """A seed of an episode, in [0, 2^63 - 1]."""
-    return checked_int("seed", value, 0, MAX_SEED)
+def checked_split(value: Any) -> str:
+    """A split by its name."""
+    if value not in SPLITS:
+        raise ValueError(f"split: {value!r} is unknown; it must be one of {', '.join(SPLITS)}")
+    return str(value)
+
+
+def checked_seed(value: Any, split: str) -> int:
+    """A seed of an episode of `split`."""
+    seed = checked_int("seed", value, 0, MAX_SEED)
+    low, high = SPLITS[split]
+    if not low <= seed <= high:
+        raise ValueError(f"seed: is {seed}; seeds of split {split} are in [{low}, {high}]")
+    return seed
+
+
+def drawn_seed(rng: np.random.Generator, split: str) -> int:
+    """A random seed of an episode of `split`."""
+    low = SPLITS[split][0]
+    # Seen and unseen episodes are as likely in both.
+    return low + int(rng.integers(2 * FIRST_UNSEEN if split == "both" else FIRST_UNSEEN))
 
 
 def kinds_of(obs: str) -> tuple[list[str], bool]:

@@ -9,7 +9,7 @@ import numpy as np
 from typing_extensions import Unpack
 
 from .cells import SavedState
-from .options import Options, checked_seed
+from .options import Options, checked_seed, drawn_seed
 from .properties import OneCellMixin, row_of
 
 
@@ -38,10 +38,11 @@ class TrocarEnv(OneCellMixin, gym.Env[Any, np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Starts the episode of `seed`, in [0, 2^63 - 1]."""
-        seed = None if seed is None else checked_seed(seed)
+        """Starts the episode of `seed`, which is one of the split."""
+        split = self.cells.split
+        seed = None if seed is None else checked_seed(seed, split)
         super().reset(seed=seed)
-        episode = seed if seed is not None else int(self.np_random.integers(2**31))
+        episode = seed if seed is not None else drawn_seed(self.np_random, split)
         self.cells.reset(np.array([0]), np.array([episode]))
         return self._observation(), self.cells.info(0)
 

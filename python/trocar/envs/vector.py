@@ -13,7 +13,7 @@ from gymnasium.vector.utils import batch_space
 from typing_extensions import Unpack
 
 from .cells import Cells, SavedState
-from .options import Options, checked_int, checked_mask, checked_seed
+from .options import Options, checked_int, checked_mask, checked_seed, drawn_seed
 from .properties import CellsMixin, OneCellMixin, row_of
 
 
@@ -85,7 +85,7 @@ class TrocarVectorEnv(CellsMixin, gym.vector.VectorEnv[Any, np.ndarray, np.ndarr
     ) -> tuple[Any, dict[str, Any]]:
         """Starts episodes in the cells that `options["reset_mask"]` flags (num_envs,), or in all.
 
-        `seed`: one a cell, or one integer S for the seeds S, S + 1, ..., each in [0, 2^63 - 1];
+        `seed`: one a cell, or one integer S for the seeds S, S + 1, ..., each one of the split;
         cells without a seed draw one. A wrong seed or mask resets nothing.
         """
         mask = checked_mask((options or {}).get("reset_mask"), self.num_envs)
@@ -106,11 +106,11 @@ class TrocarVectorEnv(CellsMixin, gym.vector.VectorEnv[Any, np.ndarray, np.ndarr
         if isinstance(seed, np.ndarray):
             seed = seed.tolist()
         if not isinstance(seed, Sequence):
-            first = checked_seed(seed)
-            return [checked_seed(first + k) for k in range(self.num_envs)]
+            first = checked_seed(seed, self.cells.split)
+            return [checked_seed(first + k, self.cells.split) for k in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise ValueError(f"seed: has length {len(seed)}; it must be {self.num_envs}")
-        return [None if one is None else checked_seed(one) for one in seed]
+        return [None if one is None else checked_seed(one, self.cells.split) for one in seed]
 
     def _restart(self, which: list[int]) -> None:
         """Starts the next episodes of the cells `which`."""
@@ -181,7 +181,7 @@ class TrocarVectorEnv(CellsMixin, gym.vector.VectorEnv[Any, np.ndarray, np.ndarr
         return row_of(self.cells.observation(), k)
 
     def _draw_seed(self, k: int) -> int:
-        return int(self._rngs[k].integers(2**31))
+        return drawn_seed(self._rngs[k], self.cells.split)
 
     def _infos(self) -> dict[str, Any]:
         infos: dict[str, Any] = {}

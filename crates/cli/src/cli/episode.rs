@@ -16,8 +16,8 @@ pub struct Episode {
     /// Seed of the start and of the policy's random numbers.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
-    /// What is drawn by the seed, instead of the scene's set: none, easy, standard or hard.
-    /// Factors that the scene itself names vary as it says.
+    /// What is drawn by the seed, instead of the scene's set: none, easy, standard or hard. By
+    /// default as the scene says. Factors that the scene itself names vary as it says.
     #[arg(long, value_name = "SET", value_parser = super::variation_set)]
     pub variation: Option<VariationSet>,
     /// Worker threads; all by default. The result does not depend on them.

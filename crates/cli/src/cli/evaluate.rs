@@ -2,7 +2,7 @@
 
 use clap::Args;
 use std::path::PathBuf;
-use trocar_scene::VariationSet;
+use trocar_scene::{Split, VariationSet};
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
@@ -17,14 +17,25 @@ pub struct Evaluate {
     /// Episodes of each policy.
     #[arg(long, default_value_t = 15)]
     pub episodes: usize,
-    /// Seed of the first episode; the following episodes have the following seeds. All policies
+    /// Number of the first episode in the split; the following episodes have the following
+    /// numbers. A seen episode's seed is its number, an unseen one's is 1000000 more. All policies
     /// have the same seeds.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
-    /// What varies between episodes, instead of the scene's set: none, easy, standard or hard.
-    /// Factors that the scene itself names vary as it says.
+    /// Episodes to train on (seen), episodes that are kept apart, with anatomies of their own
+    /// (unseen), or both in turn.
+    #[arg(long, value_name = "SPLIT", value_parser = super::split, default_value = "seen")]
+    pub split: Split,
+    /// What varies between episodes: none, easy, standard or hard. By default the set of the scene,
+    /// or standard if it has none. Factors that the scene itself names vary as it says. The first
+    /// run makes the anatomies of the set, about a minute each.
     #[arg(long, value_name = "SET", value_parser = super::variation_set)]
     pub variation: Option<VariationSet>,
+    /// Show success by these in the terminal, separated by commas: factors (modulus_kpa), groups
+    /// (organ, tissue, place, start, setup, tool, camera, light, modulus), drawn numbers
+    /// (left.tilt_deg), split, or all. Page and JSON have them too, or all that varies by default.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub by: Vec<String>,
     /// Episodes at once, up to eight per core; by default one per core. The result does not depend
     /// on it.
     #[arg(long, default_value_t = 0)]

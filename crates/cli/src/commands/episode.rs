@@ -66,7 +66,7 @@ pub fn sweep(arguments: &cli::Sweep, json: bool, progress: &dyn Progress) -> Res
     let sweep = sweep_files(&arguments.channels, &arguments.gates, progress)?;
     output::print(json, &sweep, |s| {
         let mut header: Vec<&str> = s.gates.iter().map(String::as_str).collect();
-        header.extend(s.stages.iter().map(|stage| stage.name()));
+        header.extend(s.stages.iter().map(String::as_str));
         let row = |r: &trocar_workflow::SweepRow| {
             let values = r.values.iter().map(|v| format!("{v:.4}"));
             values.chain(r.by_stage.iter().map(ToString::to_string)).collect::<Vec<_>>()
@@ -81,8 +81,8 @@ pub fn sweep(arguments: &cli::Sweep, json: bool, progress: &dyn Progress) -> Res
 fn text(made: &EpisodeOutput) -> String {
     let (r, s) = (&made.result, &made.result.summary);
     let stages = s.progress.stages.iter().map(|p| match p.time_s {
-        Some(time) => format!("{} at {time:.2} s", p.stage.name()),
-        None => format!("{} {:.0}%", p.stage.name(), 100.0 * p.share),
+        Some(time) => format!("{} at {time:.2} s", p.stage),
+        None => format!("{} {:.0}%", p.stage, 100.0 * p.share),
     });
     let mut remarks = String::new();
     for said in [&s.why, &s.advice].into_iter().flatten() {
@@ -91,10 +91,10 @@ fn text(made: &EpisodeOutput) -> String {
     if let Some(said) = s.suspensions() {
         remarks += &format!("\nsuspensions of physics: {said}");
     }
-    let grasp = match (s.grasp_at, s.slip_mm) {
-        (Some(at), Some(slip)) => {
+    let grasp = match (s.grasp_at, s.lift_mm, s.slip_mm) {
+        (Some(at), Some(lift), Some(slip)) => {
             let held = if s.held_to_end { "held to the end" } else { "not held to the end" };
-            format!("grasp at s = {at:.2}, lift {:.1} mm, slip {slip:.2} mm, {held}", s.lift_mm)
+            format!("grasp at s = {at:.2}, lift {lift:.1} mm, slip {slip:.2} mm, {held}")
         }
         _ if r.task == "port-reach" => "no grasp in this task".to_owned(),
         _ => "no grasp".to_owned(),

@@ -3,7 +3,7 @@
 use crate::cli;
 use crate::commands::scene::note_reach;
 use crate::output;
-use trocar_campaign::{Campaign, CampaignResult, PolicySpec};
+use trocar_campaign::{Campaign, CampaignResult, PolicySpec, Share, repeats};
 use trocar_core::Progress;
 use trocar_workflow::{Result, counted};
 
@@ -13,19 +13,44 @@ pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Re
         scene: arguments.scene.clone(),
         policies,
         episodes: arguments.episodes,
+        split: arguments.split,
         seed: arguments.seed,
         variation: arguments.variation,
+        by: arguments.by.clone(),
         jobs: arguments.jobs,
         retry_failed: arguments.retry_failed,
         phantoms: arguments.phantoms.clone(),
     };
     note_reach(&arguments.scene);
     let result = campaign.run(&arguments.output, progress)?;
-    output::print(json, &result, text);
+    if let Some(why) = repeats(result.distinct_outcomes, result.episodes) {
+        eprintln!("warning: {why}");
+    }
+    output::print(json, &result, |r| if arguments.by.is_empty() { text(r, "") } else { text(r, &curves(r)) });
     Ok(())
 }
 
-fn text(r: &CampaignResult) -> String {
+/// Success over each value of what was asked for.
+fn curves(r: &CampaignResult) -> String {
+    let mut lines = String::new();
+    for curve in &r.by {
+        let Some(first) = curve.bins.first() else { continue };
+        let header: Vec<&str> =
+            std::iter::once(curve.label.as_str()).chain(first.policies.iter().map(|s| s.policy.as_str())).collect();
+        let said = |s: &Share| {
+            format!("{}/{} ({:.0}-{:.0}%)", s.passed, s.episodes, 1e2 * s.interval.low, 1e2 * s.interval.high)
+        };
+        let rows: Vec<Vec<String>> = curve
+            .bins
+            .iter()
+            .map(|bin| std::iter::once(bin.value.clone()).chain(bin.policies.iter().map(said)).collect())
+            .collect();
+        lines += &format!("{}\n", output::table(&header, &rows));
+    }
+    lines
+}
+
+fn text(r: &CampaignResult, curves: &str) -> String {
     let or_dash = |v: Option<f64>, decimals: usize| v.map_or("-".to_owned(), |v| format!("{v:.decimals$}"));
     let rows: Vec<Vec<String>> = r
         .policies
@@ -51,7 +76,7 @@ fn text(r: &CampaignResult) -> String {
     let stages = r
         .policies
         .first()
-        .map_or_else(String::new, |p| p.stages.iter().map(|s| s.stage).collect::<Vec<_>>().join(", "));
+        .map_or_else(String::new, |p| p.stages.iter().map(|s| s.stage.as_str()).collect::<Vec<_>>().join(", "));
     let header = [
         "policy",
         "passed",
@@ -77,12 +102,15 @@ fn text(r: &CampaignResult) -> String {
         .collect();
     let again = if failed.is_empty() { "" } else { "--retry-failed runs them again\n" };
     format!(
-        "{}, {}: {} of {}, seeds from {}; stages: {stages}\n{}\n{failed}{again}states {}\nreport {}",
+        "{}, {}: {} of {}, split {}, from number {}, variation {}; {} distinct; stages: {stages}\n{}\n{curves}{failed}{again}states {}\nreport {}",
         r.scene,
         r.task,
         r.episodes,
         counted(r.planned, "episode"),
+        r.variation.split.name(),
         r.seed,
+        r.variation.name,
+        r.distinct_outcomes,
         output::table(&header, &rows),
         r.hash,
         r.report

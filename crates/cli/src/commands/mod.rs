@@ -12,6 +12,7 @@ mod segment;
 mod simulate;
 mod specimens;
 mod study;
+mod task;
 
 use crate::cli::{Cli, Command};
 use trocar_core::Progress;
@@ -33,6 +34,7 @@ pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
         Command::Reconstruct(arguments) => reconstruct::run(arguments, cli.json, progress)?,
         Command::Experiment(arguments) => study::run(&arguments.study.0, Kind::Experiment, cli.json, progress)?,
         Command::Scene(arguments) => scene::run(arguments, cli.json)?,
+        Command::Task(arguments) => task::run(arguments, cli.json)?,
         Command::Specimens(arguments) => specimens::run(arguments, cli.json, progress)?,
         Command::Segment(arguments) => segment::run(arguments, cli.json, progress)?,
         Command::Simulate(arguments) => simulate::run(arguments, cli.json, progress)?,

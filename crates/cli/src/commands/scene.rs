@@ -48,7 +48,7 @@ fn show(name: &str, canonical: bool, json: bool) -> Result<()> {
 #[derive(Serialize)]
 struct Checked {
     name: String,
-    task: &'static str,
+    task: String,
     organs: Vec<String>,
     arms: Vec<&'static str>,
     cameras: Vec<String>,
@@ -104,7 +104,7 @@ fn reach_lines(reach: &[ToolReach], organ: &str) -> Vec<String> {
 /// would time out. Prints nothing if the specimen must be made first.
 pub fn note_reach(name: &str) {
     let Ok(scene) = Scene::read(name) else { return };
-    let Some(Source::Folder(path)) = scene.specimen.source().filter(|_| scene.task.needs_organ()) else { return };
+    let Some(Source::Folder(path)) = scene.specimen.source().filter(|_| scene.needs_organ()) else { return };
     let Ok(specimen) = Specimen::read(&scene.resolve(path)) else { return };
     for missed in tool_reach(&scene, &specimen).unwrap_or_default().iter().filter(|r| !r.reaches()) {
         let (arm, organ, mm) = (missed.arm.name(), &scene.task.organ, missed.missed_mm);
@@ -115,14 +115,14 @@ pub fn note_reach(name: &str) {
 fn check(file: &str, json: bool) -> Result<()> {
     let scene = Scene::read(file)?;
     let reach = match scene.specimen.source() {
-        Some(Source::Folder(path)) if scene.task.needs_organ() => {
+        Some(Source::Folder(path)) if scene.needs_organ() => {
             tool_reach(&scene, &Specimen::read(&scene.resolve(path))?)?
         }
         _ => Vec::new(),
     };
     let organ = scene.task.organ.clone();
     let checked = Checked {
-        task: scene.task.name.name(),
+        task: scene.task.name.name().to_owned(),
         organs: scene.organ_names()?,
         arms: scene.tools().iter().map(|tool| tool.arm.name.name()).collect(),
         cameras: scene.cameras.iter().map(|c| c.name.clone()).collect(),

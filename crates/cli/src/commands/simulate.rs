@@ -53,17 +53,18 @@ pub fn text(r: &LiftResult) -> String {
     let s = &r.episode.summary;
     let d = &s.details;
     let peak = |of: fn(&trocar_task::ArmSummary) -> f64| s.arms.iter().map(of).fold(0.0, f64::max);
+    let measured = |v: Option<f64>, decimals: usize| v.map_or("-".to_owned(), |v| format!("{v:.decimals$}"));
     let grasp = match (s.follow_ratio, s.slip_mm) {
         (Some(follow), Some(slip)) => format!(
-            "{} grasp, {} held, jaws closed on {:.1} mm with {:.2} N: lift {:.2} mm (follows {:.0}%), slip {slip:.3} mm, snap {:.3} mm, activation step {:.3} mm: {}",
+            "{} grasp, {} held, jaws closed on {} mm with {} N: lift {} mm (follows {:.0}%), slip {slip:.3} mm, snap {} mm, activation step {} mm: {}",
             d.design,
-            counted(d.held_nodes, "node"),
-            d.gap_mm,
-            d.closing_force_n,
-            s.lift_mm,
+            counted(d.held_nodes.unwrap_or(0), "node"),
+            measured(d.gap_mm, 1),
+            measured(d.closing_force_n, 2),
+            measured(s.lift_mm, 2),
             100.0 * follow,
-            d.snap_mm,
-            d.activation_step_mm,
+            measured(d.snap_mm, 3),
+            measured(d.activation_step_mm, 3),
             if s.held { "held" } else { "NOT held" },
         ),
         _ => "no grasp: NOT held".to_owned(),

@@ -124,7 +124,11 @@ pub(crate) fn check_organs(scene: &Scene, organs: &[String]) -> Checked {
             return Err(problem(format!("organ.{organ}.pins.end"), reason));
         }
     }
-    if scene.task.needs_organ() {
+    if let Ok(context) = scene.task_context() {
+        let made = context.program_with(&scene.task.gates, Some(&known));
+        made.map_err(|m| problem(format!("task.{}", m.field), m.reason))?;
+    }
+    if scene.needs_organ() {
         one_of("task.organ", &scene.task.organ, "the specimen's organs are", &known)?;
     }
     Ok(())

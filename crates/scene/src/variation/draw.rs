@@ -1,6 +1,6 @@
 //! Drawing: the values of one episode by its seed.
 
-use super::{Factor, Per, Specimens, VariationSet};
+use super::{Factor, Per, Specimens, Split, VariationSet};
 use crate::{EpisodeRandom, Error, Lens, Result, Scene, SpecimenSource, Tool};
 use serde::de::{Error as _, MapAccess, Visitor};
 use serde::ser::SerializeMap;
@@ -180,11 +180,13 @@ impl Scene {
 
     fn draw_specimen(&self, seed: u64) -> SpecimenSource {
         let all = self.specimens();
+        let all = Split::of_seed(seed).of_specimens(&all);
         let at = EpisodeRandom::new(seed, "variation/specimen").unit(0) * all.len() as f64;
         all.get(at as usize).unwrap_or(&self.specimen).clone()
     }
 
-    /// The specimens that episodes have, in a fixed order.
+    /// The specimens that episodes have, in a fixed order; the last quarter of them is for unseen
+    /// ones ([`Split`]).
     pub fn specimens(&self) -> Vec<SpecimenSource> {
         let drawn = match (&self.variation.specimens, self.variation.set, &self.specimen.phantom) {
             (Some(drawn), _, _) => drawn.clone(),

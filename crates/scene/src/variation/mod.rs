@@ -6,10 +6,12 @@ mod distribution;
 mod draw;
 mod factor;
 mod sets;
+mod split;
 
 pub use distribution::Distribution;
 pub use draw::{Drawn, DrawnValue};
 pub use factor::{Factor, Per};
+pub use split::Split;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Error as _, MapAccess, Visitor};
@@ -106,6 +108,12 @@ impl Variation {
     /// The starts of the instruments alone, as in the paper's cell.
     pub fn starts() -> Self {
         Self { factors: sets::starts(), ..Self::default() }
+    }
+
+    /// The same with the set `given`. Without one, a scene that has no set varies by `default`.
+    pub fn chosen(&self, given: Option<VariationSet>, default: VariationSet) -> Self {
+        let own = if self.set == VariationSet::None { default } else { self.set };
+        Self { set: given.unwrap_or(own), ..self.clone() }
     }
 
     /// The largest number that is drawn for a factor; 0 where it is not drawn or never positive.

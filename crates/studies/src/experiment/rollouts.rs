@@ -12,6 +12,7 @@ use trocar_campaign::{
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::table::{count, fixed};
+use trocar_scene::{Split, VariationSet};
 use trocar_task::policy::POLICIES;
 
 /// The page of the study, beside the page of the campaign.
@@ -130,14 +131,16 @@ impl Study for RolloutsExperiment {
             scene: self.scene.scene.clone(),
             policies: POLICIES.iter().map(|name| PolicySpec::parse(name)).collect::<std::result::Result<_, _>>()?,
             episodes: self.rollouts.div_ceil(POLICIES.len()),
+            split: Split::Seen,
             seed: self.seed,
-            variation: None,
+            variation: Some(VariationSet::None),
+            by: Vec::new(),
             jobs: self.jobs,
             retry_failed: false,
             phantoms: self.scene.phantoms.clone(),
         };
-        let (store, manifest) = campaign.run_episodes(job.output(), Some(self.rollouts), job.progress)?;
-        let (made, records) = (store.write_results(&manifest)?, store.records(&manifest)?);
+        let (store, manifest, by) = campaign.run_episodes(job.output(), Some(self.rollouts), job.progress)?;
+        let (made, records) = (store.write_results(&manifest, &by)?, store.records(&manifest)?);
         let page = job.output().join(PAGE);
         let result = RolloutsResult::of(made, &records, page.display().to_string());
         let document = document(&manifest, &result, &records)?;
@@ -159,7 +162,7 @@ impl RolloutsResult {
             held_to_end: attached.iter().filter(|k| k.summary.held_to_end).count(),
             diverged: records.iter().filter(|k| k.summary.diverged).count(),
             passed: made.passed,
-            lift_median_mm: median(attached.iter().map(|k| k.summary.lift_mm).collect()),
+            lift_median_mm: median(attached.iter().filter_map(|k| k.summary.lift_mm).collect()),
             rcm_peak_median_mm: median(attached.iter().map(|k| k.summary.rcm_peak_mm).collect()),
             rcm_loaded_median_mm: median(attached.iter().filter_map(|k| k.loaded_rcm_mm()).collect()),
             rcm_within_3_mm: within(THRESHOLD_MM),

@@ -76,11 +76,18 @@ fn cluster_at(cell: &Cell, body: usize, s: f64) -> Option<Cluster> {
     all.into_iter().nth(enough)
 }
 
+/// The side of the organ's middle on which it is free: 1 towards its tip, -1 towards its base.
+fn free_side(cell: &Cell, body: usize) -> f64 {
+    let (world, organ) = (cell.world(), &cell.world().model.bodies()[body]);
+    let pinned = (0..organ.len()).filter(|i| organ.pinned()[*i]).map(|i| world.axes[body].s[i] - 0.5);
+    if pinned.sum::<f64>() > 0.0 { -1.0 } else { 1.0 }
+}
+
 /// Where a grasp is to be.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Place {
-    /// In the middle of a range of organ coordinates.
-    InRange([f64; 2]),
+    /// In a range of organ coordinates, so far from its middle, away from where the organ is held.
+    InRange([f64; 2], f64),
     /// At an organ coordinate.
     At(f64),
 }
@@ -89,7 +96,10 @@ pub(super) enum Place {
 /// blades and `aside` (m) of their closing plane.
 pub(super) fn grasp(cell: &Cell, arm: &str, body: usize, place: Place, depth: f64, aside: f64) -> Result<Aim> {
     let cluster = match place {
-        Place::InRange(range) => cluster_in_range(cell, body, 0.5 * (range[0] + range[1]), range),
+        Place::InRange(range, outward) => {
+            let s = 0.5 * (range[0] + range[1]) + outward * free_side(cell, body);
+            cluster_in_range(cell, body, s.clamp(range[0], range[1]), range)
+        }
         Place::At(s) => cluster_at(cell, body, s),
     };
     let Some(cluster) = cluster else {

@@ -3,15 +3,21 @@
 
 mod aim;
 mod cut_place;
+mod grip;
 mod perturbed;
+mod phase;
 mod random_actions;
 mod random_walk;
+mod script;
 mod scripted;
+mod steps;
 
 pub use perturbed::{DELAY_S, Delay, NOISE_M, NOISE_RAD, Noise, OFFSET_MM, Offset};
 pub use random_actions::RandomActions;
 pub use random_walk::RandomWalk;
-pub use scripted::{AfterHold, CutAt, Script, Scripted, Style};
+pub use script::{AfterHold, CutAt, Script};
+pub use scripted::{Scripted, Style};
+pub use steps::Baseline;
 
 use crate::{Episode, Error, Result};
 use trocar_cell::Action;
@@ -53,7 +59,7 @@ pub const POLICIES: [&str; 6] = ["scripted", "noise", "delay", "offset", "greedy
 /// # Errors
 /// A name that is none.
 pub fn named(name: &str) -> Result<Box<dyn Policy + Send>> {
-    let scripted = || Scripted::new(Style::Careful);
+    let scripted = Baseline::default;
     Ok(match name {
         "scripted" => Box::new(scripted()),
         "noise" => Box::new(Noise::new(scripted())),

@@ -2,13 +2,21 @@
 //! tissue between grasp and base, open, engage, close. With a [`Script`] it lifts as far as it is
 //! asked to, where it is asked to, and lowers or cuts what it lifted.
 //!
+//! The jaws close as far as the tissue between them gives ([`Grip`]). Without a script they rise
+//! until the tissue has risen, and what they could not lift they lower, let go of and grasp again,
+//! farther from where the organ is held.
+//!
 //! It looks at where the tissue is, which no policy that is scored may. All it does goes through
 //! actions, and so through controllers, arms and ports where there are any.
 
 use super::aim::{self, Aim, Place, eased};
 use super::cut_place::cut_place;
+use super::grip::Grip;
+use super::phase::Phase;
+use super::script::{AfterHold, CutAt, Script};
 use super::{CHUNK, Policy};
-use crate::{Episode, Error, Result};
+use crate::stages::{HELD_FOLLOW, HELD_SLIP_MM};
+use crate::{Channels, Episode, Error, Result};
 use glam::DVec3;
 use trocar_cell::{Action, Setpoint};
 use trocar_core::Pose;
@@ -41,6 +49,19 @@ const BESIDE: f64 = 0.0060;
 
 /// Lift of the jaws (m) above what the gate asks for.
 const ABOVE_GATE: f64 = 0.0025;
+
+/// Rise of the tissue (m) above what the gate asks for, to which the jaws go on lifting.
+const ENOUGH_ABOVE: f64 = 0.0005;
+
+/// They go on in steps of this height (m) and time (s), up to this lift above the gate (m), as long
+/// as tissue follows this share of a step.
+const RISE: f64 = 0.001;
+const RISE_S: f64 = 0.2;
+const MOST_ABOVE: f64 = 0.008;
+const RISES: f64 = 0.25;
+
+/// Every further grasp is this much farther from where the organ is held, in organ coordinates.
+const OUTWARD: f64 = 0.12;
 
 /// Time of the lift (s), and of waiting for jaws to take hold or to close.
 const LIFT_S: f64 = 1.5;
@@ -78,98 +99,6 @@ pub enum Style {
     Greedy,
 }
 
-/// Where a [`Script`] cuts.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum CutAt {
-    /// Half way between the grasp and the pinned part.
-    Between,
-    /// At an organ coordinate, 0 to 1.
-    S(f64),
-}
-
-/// What a [`Script`] does after its hold.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum AfterHold {
-    /// Nothing: it is finished.
-    #[default]
-    Finish,
-    /// Lowers what was lifted, lets go of it and is finished.
-    Lower,
-    /// Cuts the organ between the grasp and what holds it, carries on what came loose and is
-    /// finished.
-    Cut(CutAt),
-}
-
-/// A grasp-lift with a place, a height and an end of its own choice.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Script {
-    /// Organ coordinate of the grasp, 0 to 1.
-    pub at: f64,
-    /// How far beside the tissue's middle the jaws come (m), across the organ.
-    pub approach_offset: f64,
-    /// Lift of the jaws (m), in one second and held for another.
-    pub lift: f64,
-    /// The jaws first drag the tissue sideways by this much (m), let go of it there and close
-    /// again.
-    pub regrasp: Option<f64>,
-    /// Times that it tries again where the jaws took hold of nothing.
-    pub retries: usize,
-    /// What follows the hold.
-    pub after: AfterHold,
-}
-
-impl Default for Script {
-    fn default() -> Self {
-        Self { at: 0.5, approach_offset: 0.0, lift: 0.015, regrasp: None, retries: 0, after: AfterHold::default() }
-    }
-}
-
-impl Script {
-    /// Says which option is out of range.
-    ///
-    /// # Errors
-    /// The option by its name on the command line.
-    pub fn check(&self) -> Result<()> {
-        let within = |name: &str, value: f64, low: f64, high: f64, unit: &str| {
-            if (low..=high).contains(&value) {
-                return Ok(());
-            }
-            Err(Error::Option(format!("{name} is {value}{unit}; must be in [{low}, {high}]{unit}")))
-        };
-        within("--at", self.at, 0.0, 1.0, "")?;
-        within("--lift", 1e3 * self.lift, 0.1, 100.0, " mm")?;
-        within("--approach-offset", 1e3 * self.approach_offset, -50.0, 50.0, " mm")?;
-        within("--regrasp", 1e3 * self.regrasp.unwrap_or(0.0), -50.0, 50.0, " mm")?;
-        match self.after {
-            AfterHold::Cut(CutAt::S(s)) => within("--sever", s, 0.0, 1.0, ""),
-            _ => Ok(()),
-        }
-    }
-}
-
-/// What it is at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Phase {
-    Approach,
-    Enter,
-    Close,
-    Drag,
-    Release,
-    Lift,
-    Hold,
-    Lower,
-    Open,
-    Reach,
-    Engage,
-    Cut,
-    Carry,
-    Keep,
-    /// Port-reach: both arms to this target.
-    Target(usize),
-    Rest,
-    Finished,
-}
-
 /// The baseline.
 #[derive(Clone, Debug)]
 pub struct Scripted {
@@ -192,6 +121,12 @@ pub struct Scripted {
     lift: f64,
     tries: usize,
     dragged: bool,
+    grip: Grip,
+    /// How much farther from where the organ is held than its middle it grasps, in organ
+    /// coordinates.
+    outward: f64,
+    /// Rise of the tissue (mm) when the last step of the lift began.
+    risen_mm: f64,
 }
 
 impl Scripted {
@@ -216,6 +151,9 @@ impl Scripted {
             lift: 0.0,
             tries: 0,
             dragged: false,
+            grip: Grip::default(),
+            outward: 0.0,
+            risen_mm: 0.0,
         }
     }
 
@@ -226,25 +164,7 @@ impl Scripted {
 
     /// Name of the phase that it is in.
     pub fn phase(&self) -> &'static str {
-        match self.phase {
-            Phase::Approach => "approach",
-            Phase::Enter => "enter",
-            Phase::Close => "close",
-            Phase::Drag => "drag",
-            Phase::Release => "release",
-            Phase::Lift => "lift",
-            Phase::Hold => "hold",
-            Phase::Lower => "lower",
-            Phase::Open => "open",
-            Phase::Reach => "reach",
-            Phase::Engage => "engage",
-            Phase::Cut => "cut",
-            Phase::Carry => "carry",
-            Phase::Keep => "keep",
-            Phase::Target(_) => "target",
-            Phase::Rest => "rest",
-            Phase::Finished => "finished",
-        }
+        self.phase.name()
     }
 
     /// Organ coordinate at which the cutter cuts: beside the grasp, towards the base. Farther on,
@@ -299,7 +219,7 @@ impl Scripted {
                 let gates = &episode.scene().task.gates;
                 let (place, aside) = match &self.script {
                     Some(script) => (Place::At(script.at), script.approach_offset),
-                    None => (Place::InRange([gates.grasp_from, gates.grasp_to]), 0.0),
+                    None => (Place::InRange([gates.grasp_from, gates.grasp_to], self.outward), 0.0),
                 };
                 let aim = aim::grasp(cell, arms[k], body, place, GRASP_DEPTH, aside)?;
                 self.grasp = Some(aim);
@@ -313,6 +233,7 @@ impl Scripted {
                     self.to[k] = self.to[k].with_jaw(0.0);
                     self.from[k] = self.from[k].with_jaw(0.0);
                 }
+                self.grip.begin();
                 close
             }
             Phase::Drag => {
@@ -336,6 +257,13 @@ impl Scripted {
                 self.lift = self.script.map_or(gate, |script| script.lift);
                 self.send_beside(episode, arms[k], self.lift * DVec3::Z)?;
                 if self.script.is_some() { SCRIPT_LIFT_S } else { LIFT_S }
+            }
+            Phase::Rise => {
+                let Some(k) = grasper else { return Ok(()) };
+                self.risen_mm = seen(episode).task.lift_mm;
+                self.lift += RISE;
+                self.send_beside(episode, arms[k], self.lift * DVec3::Z)?;
+                RISE_S
             }
             Phase::Hold if self.script.is_some() => SCRIPT_HOLD_S,
             Phase::Hold => episode.scene().task.gates.lift_s + 0.2,
@@ -404,8 +332,7 @@ impl Scripted {
 
     /// What comes after the phase, looking at the episode as it is now.
     fn next(&mut self, episode: &Episode) {
-        let channels = episode.rows().last().copied().unwrap_or_default();
-        let (t, careful) = (channels.task, self.style == Style::Careful);
+        let (t, careful) = (seen(episode).task, self.style == Style::Careful);
         let tries = self.script.map_or(TRIES, |script| script.retries);
         let again = careful && self.tries < tries;
         let task = episode.scene().task.name;
@@ -416,6 +343,7 @@ impl Scripted {
             Phase::Enter => Phase::Close,
             Phase::Close if t.grasped == 0.0 && again => {
                 self.tries += 1;
+                self.grip.missed(self.is_disabled(episode));
                 Phase::Approach
             }
             Phase::Close if drags => Phase::Drag,
@@ -423,10 +351,18 @@ impl Scripted {
             Phase::Drag => Phase::Release,
             Phase::Release => Phase::Close,
             Phase::Lift if !careful && task != TaskName::GraspLift => Phase::Reach,
-            Phase::Lift => Phase::Hold,
+            Phase::Lift if careful && after.is_none() && self.goes_on(episode, 0.0) => Phase::Rise,
+            Phase::Rise if self.goes_on(episode, self.risen_mm + 1e3 * RISES * RISE) => Phase::Rise,
+            Phase::Lift | Phase::Rise => Phase::Hold,
             Phase::Hold if t.grasped == 0.0 && again => {
                 self.tries += 1;
                 Phase::Approach
+            }
+            Phase::Hold if after.is_none() && again && !is_lifted(episode) => {
+                self.tries += 1;
+                self.outward += OUTWARD;
+                self.grip.slipped();
+                Phase::Lower
             }
             Phase::Hold if after == Some(AfterHold::Finish) => Phase::Finished,
             Phase::Hold if after == Some(AfterHold::Lower) => Phase::Lower,
@@ -448,6 +384,7 @@ impl Scripted {
                 Phase::Reach
             }
             Phase::Carry => Phase::Keep,
+            Phase::Open if after.is_none() => Phase::Approach,
             Phase::Open | Phase::Keep | Phase::Finished => Phase::Finished,
             Phase::Cut => Phase::Rest,
             Phase::Target(n) if n < 2 => Phase::Target(n + 1),
@@ -458,13 +395,35 @@ impl Scripted {
 
     /// Whether the phase is over before its time.
     fn early(&self, episode: &Episode) -> bool {
-        let t = episode.rows().last().copied().unwrap_or_default().task;
-        self.style == Style::Careful && self.phase == Phase::Close && t.grasped > 0.0 && self.done > 0
+        self.feels() && seen(episode).task.grasped > 0.0 && self.done > 0
+    }
+
+    /// Whether the jaws are closing on what they feel.
+    fn feels(&self) -> bool {
+        self.style == Style::Careful && self.phase == Phase::Close
+    }
+
+    /// Whether the lift goes on: the tissue has risen by `least` (mm) and not yet enough.
+    fn goes_on(&self, episode: &Episode, least: f64) -> bool {
+        let (t, gate) = (seen(episode).task, episode.scene().task.gates.lift_mm);
+        let wanted = t.lift_mm < gate + 1e3 * ENOUGH_ABOVE;
+        t.grasped > 0.0 && wanted && t.lift_mm >= least && self.lift < 1e-3 * gate + MOST_ABOVE
+    }
+
+    /// Whether tissue does not feel the grasper.
+    fn is_disabled(&self, episode: &Episode) -> bool {
+        let arms = episode.cell().arms();
+        let grasper = episode.roles().0.and_then(|k| arms.get(k));
+        grasper.is_some_and(|(side, _)| episode.cell().disabled_contact(side.name()).is_ok_and(|(all, _)| all))
     }
 
     fn action(&mut self, episode: &Episode) -> Result<Action> {
         if self.count == 0 {
             self.enter(episode)?;
+        }
+        if let Some(k) = episode.roles().0.filter(|_| self.feels()) {
+            let arm = &episode.cell().observe()[k];
+            self.to[k] = self.to[k].with_jaw(self.grip.opening(arm.measured.jaw(), arm.jaw_force));
         }
         self.done += 1;
         let share = eased(self.done as f64 / self.count as f64);
@@ -476,6 +435,18 @@ impl Scripted {
         self.last = kept;
         Ok(action)
     }
+}
+
+/// The channels as they are now.
+fn seen(episode: &Episode) -> Channels {
+    episode.rows().last().copied().unwrap_or_default()
+}
+
+/// Whether held tissue is up as the task wants it.
+fn is_lifted(episode: &Episode) -> bool {
+    let (seen, task) = (seen(episode).task, &episode.scene().task);
+    let risen = seen.grasped > 0.0 && seen.lift_mm >= task.gates.lift_mm;
+    risen && (task.name != TaskName::GraspLift || (seen.follow >= HELD_FOLLOW && seen.slip_mm < HELD_SLIP_MM))
 }
 
 /// Whether what the arm at place `k` holds hangs on nothing that is pinned.
@@ -527,6 +498,9 @@ impl Policy for Scripted {
                 break;
             }
             chunk.push(self.action(episode)?);
+            if self.feels() {
+                break;
+            }
         }
         Ok(chunk)
     }

@@ -60,7 +60,7 @@ impl Solver for TouchingDescent {
         for BodySlot { index, body, solver, state, .. } in slots.iter_mut() {
             solver.contacts.end_substep(&frame.of(*index), body, to, |i| state.x[i]);
         }
-        pairs.end_substep(&mut **slots);
+        pairs.end_substep(&**slots);
     }
 
     fn end_frame(island: &mut IslandFrame<'_, Self>) {

@@ -7,7 +7,7 @@ use trocar_report::page::{self, Card, Columns};
 use trocar_report::plots::Band;
 use trocar_report::table::{self, fixed};
 use trocar_scene::TaskName;
-use trocar_task::{ArmChannels, ArmSummary, Channels, Recording, Summary};
+use trocar_task::{ArmChannels, ArmSummary, Channels, Recording, StageProgress, Summary};
 
 /// Selects the channels of one arm.
 type ArmOf = fn(&Channels) -> &ArmChannels;
@@ -65,8 +65,8 @@ fn cards(recording: &Recording, real_time_factor: f64) -> String {
             format!("{} grasp of the {organ} at s = {}", s.details.design, fixed(at, 2))
         });
         cards.push(Card::new("Held to the end", if s.held_to_end { "yes" } else { "no" }, at).met(s.held_to_end));
-        if let (Some(slip), Some(follow)) = (s.slip_mm, s.follow_ratio) {
-            cards.push(Card::new("Lift", mm(s.lift_mm), format!("follows {}% of the jaws", fixed(100.0 * follow, 0))));
+        if let (Some(lift), Some(slip), Some(follow)) = (s.lift_mm, s.slip_mm, s.follow_ratio) {
+            cards.push(Card::new("Lift", mm(lift), format!("follows {}% of the jaws", fixed(100.0 * follow, 0))));
             cards.push(Card::new("Slip", mm(slip), "of held tissue in the jaws"));
         }
     }
@@ -84,9 +84,9 @@ fn cards(recording: &Recording, real_time_factor: f64) -> String {
 }
 
 fn stages(s: &Summary) -> String {
-    let row = |p: &trocar_task::StageProgress| {
+    let row = |p: &StageProgress| {
         let time = p.time_s.map_or("\u{2013}".to_owned(), |t| fixed(t, 2));
-        vec![p.stage.name().to_owned(), if p.passed { "yes" } else { "no" }.to_owned(), time, fixed(100.0 * p.share, 0)]
+        vec![p.stage.clone(), if p.passed { "yes" } else { "no" }.to_owned(), time, fixed(100.0 * p.share, 0)]
     };
     let rows: Vec<Vec<String>> = s.progress.stages.iter().map(row).collect();
     let lead = "Stages pass in order. Share: progress towards passing the stage.";
@@ -136,9 +136,12 @@ fn arms(recording: &Recording) -> String {
 fn bands(s: &Summary) -> Vec<Band> {
     let mut from = 0.0;
     let mut bands = Vec::new();
-    for stage in &s.progress.stages {
+    let mut stages: Vec<&StageProgress> = s.progress.stages.iter().collect();
+    // Stages that pass in any order, in that in which they did.
+    stages.sort_by(|a, b| a.time_s.unwrap_or(f64::INFINITY).total_cmp(&b.time_s.unwrap_or(f64::INFINITY)));
+    for stage in stages {
         let to = stage.time_s.unwrap_or(s.duration_s);
-        bands.push(Band { name: stage.stage.name().to_owned(), from, to });
+        bands.push(Band { name: stage.stage.clone(), from, to });
         from = to;
         if stage.time_s.is_none() {
             break;

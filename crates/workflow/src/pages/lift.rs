@@ -43,21 +43,33 @@ pub(super) fn sections(lifted: &FinishedLift) -> Result<(String, String)> {
 fn cards(lifted: &FinishedLift) -> String {
     let (r, s) = (&lifted.result, &lifted.recording.summary);
     let (d, mm) = (&s.details, |v: f64| format!("{} mm", fixed(v, 2)));
+    // What was not measured is shown as a dash.
+    let of_grasp = |v: Option<f64>| v.unwrap_or(f64::NAN);
     let grasp = s.grasp_at.map_or("no grasp".to_owned(), |at| {
-        format!("{} grasp of {} of the {} at s = {}", d.design, counted(d.held_nodes, "node"), d.organ, fixed(at, 2))
+        format!(
+            "{} grasp of {} of the {} at s = {}",
+            d.design,
+            counted(d.held_nodes.unwrap_or(0), "node"),
+            d.organ,
+            fixed(at, 2)
+        )
     });
     let mut cards = vec![Card::new("Held", if s.held { "yes" } else { "no" }, grasp).met(s.held)];
     if let (Some(slip), Some(follow)) = (s.slip_mm, s.follow_ratio) {
         cards.extend([
-            Card::new("Lift", mm(s.lift_mm), format!("follows {}% of the jaws", fixed(100.0 * follow, 0)))
+            Card::new("Lift", mm(of_grasp(s.lift_mm)), format!("follows {}% of the jaws", fixed(100.0 * follow, 0)))
                 .met(follow >= 0.8),
             Card::new("Slip", mm(slip), "less than 3 mm counts as held").met(slip < 3.0),
-            Card::new("Snap", mm(d.snap_mm), "largest displacement that the grasp prescribes at its start"),
-            Card::new("Activation step", mm(d.activation_step_mm), "largest motion of a node in its first frame"),
+            Card::new("Snap", mm(of_grasp(d.snap_mm)), "largest displacement that the grasp prescribes at its start"),
+            Card::new(
+                "Activation step",
+                mm(of_grasp(d.activation_step_mm)),
+                "largest motion of a node in its first frame",
+            ),
             Card::new(
                 "Jaws",
-                format!("{} N", fixed(d.closing_force_n, 2)),
-                format!("of {} N; gap {} mm", fixed(d.jaw_force_n, 2), fixed(d.gap_mm, 1)),
+                format!("{} N", fixed(of_grasp(d.closing_force_n), 2)),
+                format!("of {} N; gap {} mm", fixed(d.jaw_force_n, 2), fixed(of_grasp(d.gap_mm), 1)),
             ),
         ]);
     }

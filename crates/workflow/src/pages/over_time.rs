@@ -97,35 +97,17 @@ pub(super) fn events(events: &[(f64, CellEvent)]) -> String {
     page::section("Events", "", &table::plain(&["Time (s)", "Event"], &rows))
 }
 
-/// Keys of figures that only a grasp has.
-const GRASP_FIGURES: [&str; 9] = [
-    "held_nodes",
-    "gap_mm",
-    "closing_force_n",
-    "snap_mm",
-    "snap_mean_mm",
-    "activation_step_mm",
-    "displaced_mm",
-    "lift_mm",
-    "slipped",
-];
-
 /// The section of all numbers, texts and flags of `result` by key. Figures that were not measured
-/// have a dash, as those of a grasp if there was none.
+/// have a dash.
 pub(super) fn all_figures(result: &impl Serialize) -> String {
     let Ok(serde_json::Value::Object(all)) = serde_json::to_value(result) else { return String::new() };
-    let grasped = all.get("grasp_at").is_some_and(|at| !at.is_null());
     let simple = all.into_iter().filter(|(_, v)| !v.is_array() && !v.is_object());
-    let text = |key: &str, v: serde_json::Value| match v {
-        _ if !grasped && GRASP_FIGURES.contains(&key) => "\u{2013}".to_owned(),
+    let text = |v: serde_json::Value| match v {
         serde_json::Value::Null => "\u{2013}".to_owned(),
         serde_json::Value::String(text) => text,
         other => other.to_string(),
     };
-    let row = |(key, value): (String, serde_json::Value)| {
-        let text = text(&key, value);
-        vec![key, text]
-    };
+    let row = |(key, value): (String, serde_json::Value)| vec![key, text(value)];
     let rows: Vec<Vec<String>> = simple.map(row).collect();
     page::section("All figures", "", &table::plain(&["Figure", "Value"], &rows))
 }

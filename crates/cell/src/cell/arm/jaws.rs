@@ -13,6 +13,16 @@ use trocar_tissue::Piece;
 /// Jaws that press with this share of their force have closed on tissue.
 const PRESSING: f64 = 0.95;
 
+/// Jaws that a command stops short of closed hold with the force of the tissue on them (N), at
+/// least this ...
+const MIN_GRIP: f64 = 0.02;
+
+/// ... after they have stood there for this many tissue frames (0.1 s); jaws that move close on.
+const STANDING_FRAMES: u32 = 6;
+
+/// Openings that differ by less are the same.
+const SAME_OPENING: f64 = 1e-9;
+
 /// Minimum difference between commanded and present opening that closes or opens the jaws.
 const LEAST_COMMANDED_MOTION: f64 = 0.02;
 
@@ -22,9 +32,12 @@ impl ArmUnit {
         JawRegion::sized(&self.state.gripper, self.model.blades.length)
     }
 
-    /// Jaws that press grasp the tissue between them; jaws that are commanded to open release it.
+    /// Jaws that press grasp the tissue between them, with their whole force or with the force they
+    /// have where their command stops them; jaws that are commanded to open release it.
     pub fn grasp(&mut self, world: &mut World, events: &mut Vec<CellEvent>) {
         let (wanted, opening) = (self.state.wanted.jaw(), self.opening());
+        let force = opening_force(&self.state.gripper, Tools::of(0), &self.state.forces);
+        self.count_standing(wanted, opening, force);
         if let Some(held) = &self.state.held {
             let opens = wanted > held.opening + LEAST_COMMANDED_MOTION;
             let lost =
@@ -34,14 +47,29 @@ impl ArmUnit {
             }
             return;
         }
-        let presses =
-            opening_force(&self.state.gripper, Tools::of(0), &self.state.forces) >= PRESSING * self.state.jaw.budget;
-        if wanted < opening - LEAST_COMMANDED_MOTION && presses {
-            self.take_hold(world, events);
+        let budget = self.state.jaw.budget;
+        if wanted < opening - LEAST_COMMANDED_MOTION && force >= PRESSING * budget {
+            self.take_hold(budget, world, events);
+        } else if self.state.standing >= STANDING_FRAMES {
+            self.take_hold(force.min(budget), world, events);
         }
     }
 
-    fn take_hold(&mut self, world: &mut World, events: &mut Vec<CellEvent>) {
+    /// Counts the frames for which jaws that closed on tissue have stood where they were told to.
+    fn count_standing(&mut self, wanted: f64, opening: f64, force: f64) {
+        let state = &mut self.state;
+        // Shut blades hold nothing.
+        let stopped = wanted > 0.0 && (wanted - opening).abs() < SAME_OPENING;
+        let there = state.held.is_none() && stopped && force >= MIN_GRIP;
+        state.standing = match state.standing {
+            0 => u32::from(there && state.jaw_rate < 0.0),
+            frames if there => frames + 1,
+            _ => 0,
+        };
+    }
+
+    /// Takes hold of what is between the blades, which press on it with `closing` (N).
+    fn take_hold(&mut self, closing: f64, world: &mut World, events: &mut Vec<CellEvent>) {
         let (region, opening) = (self.jaw_region(), self.opening());
         let Self { model, state, .. } = self;
         let Some((organ, tissue)) = region.fullest(world) else { return };
@@ -50,7 +78,7 @@ impl ArmUnit {
         let pose = state.gripper.pose;
         let closing_force_n = opening_force(&state.gripper, Tools::of(0), &state.forces);
         let displaced_mm = 1e3 * candidate.displaced(world, organ);
-        let forces = JawForces { closing: state.jaw.budget, tearing: model.tear_force };
+        let forces = JawForces { closing, tearing: model.tear_force };
         let grasp = state.design.grasp(world, organ, &candidate.nodes, model.tools, &pose, forces);
         let snap = grasp.as_ref().map(|g| Snap::of(world, g, &pose)).unwrap_or_default();
         let hold = Hold::new(world, organ, candidate.nodes, &pose);

@@ -55,6 +55,8 @@ pub(crate) struct ArmState {
     /// shear tissue and do not press it.
     pub shears: Option<f64>,
     pub held: Option<Held>,
+    /// Tissue frames for which jaws that closed on tissue have stood where they are commanded.
+    pub standing: u32,
     /// Whether contact of the whole instrument is disabled.
     pub contact_disabled: bool,
     /// Whether contact of the blades is disabled, until they release their grasp.
@@ -116,6 +118,7 @@ impl ArmState {
             scissors,
             shears: None,
             held: None,
+            standing: 0,
             contact_disabled: false,
             blades_disabled: false,
             rcm_peak: 0.0,
@@ -141,6 +144,7 @@ impl ArmState {
             scissors,
             shears,
             held,
+            standing,
             contact_disabled,
             blades_disabled,
             rcm_peak,
@@ -180,6 +184,11 @@ impl ArmState {
         if let Some(Held { organ, s, hold, opening }) = held {
             all.extend([*organ as f64, *s, *opening]);
             all.extend(hold.numbers());
+        }
+        // Only where there is something to count: hashes in episodes that were recorded before it
+        // was counted stay valid.
+        if *standing > 0 {
+            all.push(f64::from(*standing));
         }
         all
     }

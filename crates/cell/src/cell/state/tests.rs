@@ -39,6 +39,7 @@ fn changes(state: &ArmState, hold: &Hold) -> Vec<(&'static str, ArmState)> {
         blades_disabled: _,
         rcm_peak: _,
         rcm_reported: _,
+        standing: _,
     } = state;
     let changed = |change: &dyn Fn(&mut ArmState)| {
         let mut other = state.clone();
@@ -60,6 +61,7 @@ fn changes(state: &ArmState, hold: &Hold) -> Vec<(&'static str, ArmState)> {
         ("forces", changed(&|s| s.forces[1].pressing += 1e-9)),
         ("scissors", changed(&|s| s.scissors = crate::Scissors::new(0.9, 0.1))),
         ("shears", changed(&|s| s.shears = Some(0.5))),
+        ("standing", changed(&|s| s.standing = 3)),
         ("held", changed(&|s| s.held = Some(Held { organ: 0, s: 0.5, hold: hold.clone(), opening: 0.1 }))),
         ("contact_disabled", changed(&|s| s.contact_disabled ^= true)),
         ("blades_disabled", changed(&|s| s.blades_disabled ^= true)),

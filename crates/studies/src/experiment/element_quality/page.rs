@@ -115,6 +115,7 @@ fn table(rows: &[&ElementQualityRow]) -> Table {
         "Suspensions",
         "Remarks",
     ];
+    let or_dash = |value: Option<f64>, decimals: usize| fixed(value.unwrap_or(f64::NAN), decimals);
     let yes = |b: bool| if b { "yes" } else { "no" }.to_owned();
     let row = |row: &&ElementQualityRow| {
         vec![
@@ -128,10 +129,10 @@ fn table(rows: &[&ElementQualityRow]) -> Table {
             yes(row.diverged),
             fixed(row.min_volume_ratio, 3),
             count(row.yielded_substeps),
-            fixed(row.follow_ratio, 3),
-            fixed(row.slip_mm, 2),
-            fixed(row.activation_step_mm, 2),
-            fixed(row.peak_constraint_n, 2),
+            or_dash(row.follow_ratio, 3),
+            or_dash(row.slip_mm, 2),
+            or_dash(row.activation_step_mm, 2),
+            or_dash(row.peak_constraint_n, 2),
             yes(row.held),
             suspensions(row.suspensions),
             remarks(row.divergence.as_ref(), row.why.as_ref(), (row.slipped, row.torn), None),

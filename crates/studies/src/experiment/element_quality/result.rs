@@ -37,14 +37,14 @@ pub struct ElementQualityRow {
     pub min_volume_ratio: f64,
     /// Whether it held: follow ratio at least 0.80 and slip under 3 mm.
     pub held: bool,
-    /// Tissue lift over jaw lift.
-    pub follow_ratio: f64,
+    /// Tissue lift over jaw lift. None without a grasp, like the next three.
+    pub follow_ratio: Option<f64>,
     /// Slip (mm).
-    pub slip_mm: f64,
+    pub slip_mm: Option<f64>,
     /// Largest motion of a node in the first frame of the grasp (mm).
-    pub activation_step_mm: f64,
+    pub activation_step_mm: Option<f64>,
     /// Largest force of held nodes on the gripper (N).
-    pub peak_constraint_n: f64,
+    pub peak_constraint_n: Option<f64>,
     /// How often held tissue slipped.
     pub slipped: usize,
     /// Whether the tissue tore out.

@@ -1,0 +1,154 @@
+//! The sections of a campaign's page on what varied: the factors, success over each of them, and
+//! what was drawn for every episode.
+
+use crate::curves::{Curve, significant};
+use crate::drawn_result::words;
+use crate::manifest::Manifest;
+use crate::page::{share, why};
+use crate::plots;
+use crate::store::EpisodeRecord;
+use crate::table::{CampaignResult, Interval};
+use std::collections::BTreeMap;
+use trocar_report::page::{self, Columns};
+use trocar_report::table;
+use trocar_scene::{Split, VariationSet};
+use trocar_workflow::{Result, counted};
+
+/// Maximum number of episodes in the table.
+const MAX_LISTED: usize = 400;
+
+/// What varied and by how much.
+pub(super) fn varied(manifest: &Manifest, r: &CampaignResult, records: &[EpisodeRecord]) -> String {
+    let factors = manifest.variation.all_factors();
+    let drawn: Vec<_> = records.iter().filter_map(|k| k.summary.drawn.as_ref()).collect();
+    let mut specimens: BTreeMap<(usize, String), usize> = BTreeMap::new();
+    for drawn in &drawn {
+        let label = drawn.specimen.label();
+        *specimens.entry((label.len(), label)).or_default() += 1;
+    }
+    let listed: Vec<String> = specimens.iter().map(|((_, label), n)| format!("{label} ({n})")).collect();
+    let mut rows = vec![vec![
+        "specimen".to_owned(),
+        "The anatomy, with the number of its episodes.".to_owned(),
+        if specimens.len() > 1 { "each as likely" } else { "the same" }.to_owned(),
+        listed.join(", "),
+    ]];
+    for (factor, distribution) in &factors {
+        let values = || drawn.iter().flat_map(|d| &d.values).filter(|v| v.factor == *factor).map(|v| v.value);
+        let Some(low) = values().reduce(f64::min) else { continue };
+        let high = values().reduce(f64::max).unwrap_or(low);
+        rows.push(vec![
+            factor.name().to_owned(),
+            factor.about().to_owned(),
+            words(distribution),
+            format!("{} to {}", significant(low, 3), significant(high, 3)),
+        ]);
+    }
+    let set = match manifest.variation.set {
+        VariationSet::None => "What the scene itself names varies".to_owned(),
+        set => format!("The set {} varies, and what the scene itself names", set.name()),
+    };
+    let split = match manifest.split {
+        Split::Seen => format!(
+            "Episodes are seen ones: seeds below {}, without the last quarter of the specimens.",
+            Split::FIRST_UNSEEN
+        ),
+        Split::Unseen => format!(
+            "Episodes are unseen ones: seeds from {} on, with the last quarter of the specimens.",
+            Split::FIRST_UNSEEN
+        ),
+        Split::Both => "Seen and unseen episodes take turns.".to_owned(),
+    };
+    let names = ["factor", "what it is", "distribution", "drawn"];
+    let lead =
+        format!("{set}, drawn by the seed of each episode ({}). {split}", counted(r.variation.episodes.len(), "seed"));
+    page::section("Variation", &lead, &table::plain(&names, &rows))
+}
+
+/// Success over each thing that varied; empty if nothing did.
+pub(super) fn curves(r: &CampaignResult) -> Result<String> {
+    if r.by.is_empty() {
+        return Ok(String::new());
+    }
+    let mut figures = Vec::new();
+    let policies: Vec<&str> = r.policies.iter().map(|p| p.policy.as_str()).collect();
+    let (mut wide, mut tables) = (String::new(), String::new());
+    for curve in &r.by {
+        if curve.bins.iter().all(|bin| bin.numbers.is_some()) {
+            figures.push(plots::success_over(&policies, curve)?);
+        } else {
+            wide += &plots::success_by_name(curve);
+        }
+        tables += &by_value(curve);
+    }
+    let lead = "Share of episodes that passed, over what was drawn. Numbers are in bins of equally many episodes; a \
+                point is at the median of its bin. Whiskers: Wilson, 95%. Several factors vary at once, so a curve is \
+                over all values of the others.";
+    let body = weakest(r) + &wide + &page::grid(Columns::Two, &figures) + &page::fold("All values", &tables);
+    Ok(page::section("Success by factor", lead, &body))
+}
+
+/// For each policy and factor the value with the least success.
+fn weakest(r: &CampaignResult) -> String {
+    let cell = |curve: &Curve, policy: usize| {
+        let shares = curve.bins.iter().filter_map(|bin| Some((bin, bin.policies.get(policy)?)));
+        // The first of equals.
+        let least = shares
+            .filter(|(_, s)| s.episodes > 0)
+            .reduce(|least, next| if next.1.interval.share < least.1.interval.share { next } else { least });
+        least.map_or("\u{2013}".to_owned(), |(bin, s)| format!("{}: {}/{}", bin.value, s.passed, s.episodes))
+    };
+    let head: Vec<&str> =
+        ["least success at"].into_iter().chain(r.policies.iter().map(|p| p.policy.as_str())).collect();
+    let row = |curve: &Curve| {
+        std::iter::once(curve.label.clone()).chain((0..r.policies.len()).map(|k| cell(curve, k))).collect::<Vec<_>>()
+    };
+    table::plain(&head, &r.by.iter().map(row).collect::<Vec<_>>())
+}
+
+fn by_value(curve: &Curve) -> String {
+    let Some(first) = curve.bins.first() else { return String::new() };
+    let names = first.policies.iter().map(|s| s.policy.as_str());
+    let head: Vec<&str> = std::iter::once(curve.label.as_str()).chain(names).collect();
+    let said = |passed: usize, all: usize, i: &Interval| format!("{passed}/{all}, {}", share(i));
+    let row = |bin: &crate::curves::Bin| {
+        let cells = bin.policies.iter().map(|s| said(s.passed, s.episodes, &s.interval));
+        std::iter::once(bin.value.clone()).chain(cells).collect::<Vec<_>>()
+    };
+    table::plain(&head, &curve.bins.iter().map(row).collect::<Vec<_>>())
+}
+
+/// Every episode with what was drawn for it, folded.
+pub(super) fn episodes(records: &[EpisodeRecord]) -> String {
+    let names: Vec<String> = records
+        .iter()
+        .find_map(|k| k.summary.drawn.as_ref())
+        .map_or_else(Vec::new, |drawn| drawn.values.iter().map(|v| v.name()).collect());
+    let fixed = ["policy", "seed", "split", "passed", "stages", "end", "suspensions", "specimen"];
+    let head: Vec<&str> = fixed.into_iter().chain(names.iter().map(String::as_str)).collect();
+    let row = |k: &EpisodeRecord| {
+        let s = &k.summary;
+        let drawn = s.drawn.as_ref();
+        let number = |name: &String| {
+            let value = drawn.and_then(|d| d.values.iter().find(|v| v.name() == *name));
+            value.map_or("\u{2013}".to_owned(), |v| significant(v.value, 3))
+        };
+        let first = [
+            k.name.clone(),
+            k.seed.to_string(),
+            Split::of_seed(k.seed).name().to_owned(),
+            if s.passed { "yes" } else { "no" }.to_owned(),
+            format!("{} of {}", s.stage, s.progress.stages.len()),
+            if s.passed { "passed".to_owned() } else { why(k) },
+            format!("{}/{}/{}", s.disabled_contacts, s.disabled_blades, s.relaxed),
+            drawn.map_or("\u{2013}".to_owned(), |d| d.specimen.label()),
+        ];
+        first.into_iter().chain(names.iter().map(number)).collect::<Vec<_>>()
+    };
+    let rows: Vec<Vec<String>> = records.iter().take(MAX_LISTED).map(row).collect();
+    let note = if records.len() > MAX_LISTED { format!("the first {MAX_LISTED} of ") } else { String::new() };
+    let title = format!("{note}{}", counted(records.len(), "episode"));
+    let lead = "What was drawn for each episode, and how it ended. Suspensions: contacts disabled, contacts of blades \
+                disabled, organs relaxed. <code>table.csv</code> has all figures.";
+    page::section("Episodes", lead, &page::fold(&title, &table::plain(&head, &rows)))
+}

@@ -1,0 +1,98 @@
+//! What a task measures beside the channels: distances, displacements and what is held where.
+
+use crate::measure::{MID_JAWS, between_blades, bodies_of, flag, nearest};
+use crate::{Channels, Result};
+use glam::DVec3;
+use trocar_cell::Cell;
+use trocar_scene::{MOST_MEASURES, Measure, Part, Place, Side, Target};
+
+/// The measures of a task, and where what moves was at the episode's start (m, cell).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Measures {
+    list: Vec<Measure>,
+    origins: Vec<DVec3>,
+}
+
+impl Measures {
+    /// At the start of an episode.
+    pub fn begin(cell: &Cell, list: &[Measure]) -> Result<Self> {
+        let origin = |measure: &Measure| match measure {
+            Measure::Moved(what) | Measure::Aside(what) | Measure::Risen(what) => place(cell, what),
+            Measure::Distance(..) | Measure::Held(..) | Measure::InMouth(..) => Ok(DVec3::ZERO),
+        };
+        Ok(Self { list: list.to_vec(), origins: list.iter().map(origin).collect::<Result<_>>()? })
+    }
+
+    /// Fills the measures of `row`.
+    pub fn measure(&self, cell: &Cell, row: &mut Channels) -> Result<()> {
+        let mut all = [0.0; MOST_MEASURES];
+        for ((value, measure), origin) in all.iter_mut().zip(&self.list).zip(&self.origins) {
+            *value = one(cell, measure, *origin)?;
+        }
+        row.measures = all;
+        Ok(())
+    }
+}
+
+fn one(cell: &Cell, measure: &Measure, origin: DVec3) -> Result<f64> {
+    let up = cell.world().up;
+    let arm = |side: Side| cell.arms().iter().position(|(own, _)| *own == side);
+    Ok(match measure {
+        Measure::Distance(from, Target::Place(to)) => 1e3 * point(cell, *from)?.distance(point(cell, *to)?),
+        Measure::Distance(from, Target::Part(part)) => {
+            let from = point(cell, *from)?;
+            let distance = |body: usize| {
+                let s = &cell.world().axes[body].s;
+                nearest(cell, body, from, |i| (part.range[0]..=part.range[1]).contains(&s[i]))
+            };
+            let least = bodies_of(cell, &part.organ).into_iter().map(distance).fold(f64::INFINITY, f64::min);
+            // As for the distances that are channels: files have no infinity.
+            if least.is_finite() { 1e3 * least } else { 1e3 }
+        }
+        Measure::Held(side, organ) => {
+            let held = arm(*side).and_then(|k| cell.carried(k));
+            held.filter(|c| bodies_of(cell, organ).contains(&c.organ)).map_or(-1.0, |c| c.s)
+        }
+        Measure::InMouth(side, organ) => {
+            flag(arm(*side).is_some_and(|k| between_blades(cell, k, &bodies_of(cell, organ)).0))
+        }
+        Measure::Moved(what) => 1e3 * place(cell, what)?.distance(origin),
+        Measure::Aside(what) => {
+            let by = place(cell, what)? - origin;
+            1e3 * (by - by.dot(up) * up).length()
+        }
+        Measure::Risen(what) => 1e3 * (place(cell, what)? - origin).dot(up),
+    })
+}
+
+/// A point of an instrument (m, cell).
+fn point(cell: &Cell, place: Place) -> Result<DVec3> {
+    Ok(match place {
+        Place::Tip(side) => cell.blade_tip(side.name())?,
+        Place::Jaws(side) => cell.measured_cp(side.name())?.transform(MID_JAWS * DVec3::X),
+    })
+}
+
+/// A point of an instrument, or the centroid of a part of an organ (m, cell).
+fn place(cell: &Cell, target: &Target) -> Result<DVec3> {
+    match target {
+        Target::Place(place) => point(cell, *place),
+        Target::Part(part) => Ok(centroid(cell, part)),
+    }
+}
+
+/// The centroid of a part of an organ (m, cell); of the whole organ where no node lies in the part.
+fn centroid(cell: &Cell, part: &Part) -> DVec3 {
+    let world = cell.world();
+    let (mut sum, mut count, mut whole, mut nodes) = (DVec3::ZERO, 0_usize, DVec3::ZERO, 0_usize);
+    for body in bodies_of(cell, &part.organ) {
+        for (i, s) in world.axes[body].s.iter().enumerate() {
+            let p = world.state.position(&world.model, body, i);
+            (whole, nodes) = (whole + p, nodes + 1);
+            if (part.range[0]..=part.range[1]).contains(s) {
+                (sum, count) = (sum + p, count + 1);
+            }
+        }
+    }
+    if count > 0 { sum / count as f64 } else { whole / nodes.max(1) as f64 }
+}

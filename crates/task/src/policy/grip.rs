@@ -1,0 +1,109 @@
+//! How far jaws close on what they feel: at a share of the opening at which they met it.
+//!
+//! What lies between the blades gives way to the same share of its thickness, whatever its
+//! stiffness, and presses on them in proportion to that. So soft tissue is held with little force
+//! and not crushed, and stiff tissue with all the force that the jaws have, before they are there.
+
+/// Force on the blades (N) from which on they have met something.
+const TOUCH: f64 = 0.002;
+
+/// Share of the opening at the first touch to which the jaws close at first.
+const SHARE: f64 = 0.30;
+
+/// Range of that share.
+const SHARES: [f64; 2] = [0.2, 0.5];
+
+/// Smallest opening to which they close on what they have met: blades that are closer than the skin
+/// of either hold nothing.
+const LEAST_OPENING: f64 = 0.15;
+
+/// Change of the share for the next grasp: after tissue slipped or was missed, and after it was
+/// strained too much.
+const TIGHTER: f64 = 0.85;
+const LOOSER: f64 = 1.3;
+
+/// The closing of one pair of jaws.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Grip {
+    share: f64,
+    /// Opening at which this closing met something.
+    touched: Option<f64>,
+}
+
+impl Default for Grip {
+    fn default() -> Self {
+        Self { share: SHARE, touched: None }
+    }
+}
+
+impl Grip {
+    /// A closing begins.
+    pub fn begin(&mut self) {
+        self.touched = None;
+    }
+
+    /// The opening to ask for, of jaws that are open by `opening` and pushed apart with `force`
+    /// (N).
+    pub fn opening(&mut self, opening: f64, force: f64) -> f64 {
+        if self.touched.is_none() && force > TOUCH {
+            self.touched = Some(opening);
+        }
+        self.touched.map_or(0.0, |touched| (self.share * touched).max(LEAST_OPENING).min(opening))
+    }
+
+    /// What was held slipped: tighter next time.
+    pub fn slipped(&mut self) {
+        self.change(TIGHTER);
+    }
+
+    /// Nothing was held: because tissue was strained beyond what it bears (`strained`), or because
+    /// the jaws did not close enough on it.
+    pub fn missed(&mut self, strained: bool) {
+        self.change(if strained { LOOSER } else { TIGHTER });
+    }
+
+    fn change(&mut self, factor: f64) {
+        self.share = (factor * self.share).clamp(SHARES[0], SHARES[1]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Closes at full speed on a spring of `stiffness` (N per opening) from opening 0.6 on: the
+    /// opening and the force where the jaws stop, by their command or by their force of 0.5 N.
+    fn close(grip: &mut Grip, stiffness: f64) -> (f64, f64) {
+        grip.begin();
+        let force = |opening: f64| stiffness * (0.6 - opening).max(0.0);
+        let mut opening: f64 = 1.0;
+        for _ in 0..60 {
+            let wanted = grip.opening(opening, force(opening));
+            opening = (opening - 0.05).max(wanted).max(0.6 - 0.5 / stiffness);
+        }
+        (opening, force(opening))
+    }
+
+    #[test]
+    fn soft_tissue_is_squeezed_as_far_as_stiff_tissue_and_no_further() {
+        let (soft, softer) = (close(&mut Grip::default(), 0.4), close(&mut Grip::default(), 0.1));
+        assert!(soft.1 < 0.5 && (soft.0 - softer.0).abs() < 0.02, "{soft:?} {softer:?}");
+        assert!((soft.1 / softer.1 - 4.0).abs() < 0.3, "force in proportion to stiffness: {soft:?} {softer:?}");
+        let stiff = close(&mut Grip::default(), 10.0);
+        assert!((stiff.1 - 0.5).abs() < 1e-9 && stiff.0 > 0.5, "all the force: {stiff:?}");
+    }
+
+    #[test]
+    fn it_learns_from_what_slipped_and_what_was_crushed() {
+        let at = |learn: fn(&mut Grip)| {
+            let mut grip = Grip::default();
+            learn(&mut grip);
+            close(&mut grip, 0.4).0
+        };
+        assert!(at(Grip::slipped) < at(|_| ()) && at(|g| g.missed(true)) > at(|_| ()));
+        let mut grip = Grip::default();
+        (0..20).for_each(|_| grip.slipped());
+        assert!(close(&mut grip, 0.4).0 >= LEAST_OPENING);
+        assert_eq!(close(&mut Grip::default(), 0.0).0, 0.0, "on nothing they close");
+    }
+}

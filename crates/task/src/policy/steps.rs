@@ -1,0 +1,258 @@
+//! The baseline of a task of one's own: the steps of its `[[task.script]]`, one after the other.
+//!
+//! Like the scripted controller it looks at where the tissue is, which no policy that is scored
+//! may, and all it does goes through actions.
+
+use super::aim::{self, Place, eased};
+use super::scripted::{Scripted, Style};
+use super::{CHUNK, Policy};
+use crate::judge::{Memory, Sight};
+use crate::measure::bodies_of;
+use crate::{Episode, Error, Result};
+use glam::DVec3;
+use trocar_cell::{Action, Setpoint};
+use trocar_core::Pose;
+use trocar_scene::{ScriptAction, ScriptProgram};
+
+/// Way along the shaft from which open jaws come and to which they draw back (m).
+const BACK: f64 = 0.025;
+/// Tissue is taken this far from the pivot (m): in the middle of the jaws.
+const DEPTH: f64 = 0.0115;
+/// Speed of the tips on the way, at tissue, and with tissue in the jaws (m/s).
+const FAST: f64 = 0.04;
+const SLOW: f64 = 0.025;
+const HELD: f64 = 0.015;
+/// Longest time that jaws get to take hold, and the time that they open in (s).
+const CLOSE_S: f64 = 1.5;
+const OPEN_S: f64 = 0.5;
+/// Times that it tries again to grasp.
+const TRIES: usize = 3;
+
+/// A part of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    Approach,
+    Enter,
+    Close,
+    Move,
+    Open,
+    Withdraw,
+    Wait,
+}
+
+/// Follows the script of the episode's task.
+#[derive(Clone, Debug, Default)]
+struct Steps {
+    step: usize,
+    phase: Option<Phase>,
+    /// Periods of the phase that are over, of as many.
+    done: usize,
+    count: usize,
+    from: Vec<Setpoint>,
+    to: Vec<Setpoint>,
+    last: Vec<Setpoint>,
+    until: Memory,
+    tries: usize,
+}
+
+impl Steps {
+    fn begin(episode: &Episode) -> Result<Self> {
+        let mut made = Self::default();
+        let arms = episode.cell().arms();
+        made.last = arms.iter().map(|(side, _)| Ok(episode.cell().setpoint(side.name())?)).collect::<Result<_>>()?;
+        made.enter_step(episode)?;
+        Ok(made)
+    }
+
+    fn script<'e>(&self, episode: &'e Episode) -> Option<&'e ScriptProgram> {
+        episode.program().script.get(self.step)
+    }
+
+    /// The place of the step's arm.
+    fn arm(episode: &Episode, step: &ScriptProgram) -> Result<usize> {
+        let place = episode.cell().arms().iter().position(|(side, _)| *side == step.arm);
+        place.ok_or_else(|| Error::Option(format!("the scene has no {} arm", step.arm.name())))
+    }
+
+    fn enter_step(&mut self, episode: &Episode) -> Result<()> {
+        let Some(step) = self.script(episode) else {
+            self.phase = None;
+            return Ok(());
+        };
+        self.until = Memory::new(step.timers, step.marks);
+        self.enter(
+            episode,
+            match step.action {
+                ScriptAction::Grasp(_) => Phase::Approach,
+                ScriptAction::Move(_) => Phase::Move,
+                ScriptAction::Release => Phase::Open,
+                ScriptAction::Wait => Phase::Wait,
+            },
+        )
+    }
+
+    fn enter(&mut self, episode: &Episode, phase: Phase) -> Result<()> {
+        let Some(step) = self.script(episode) else { return Ok(()) };
+        let (cell, k) = (episode.cell(), Self::arm(episode, step)?);
+        let name = step.arm.name();
+        (self.phase, self.done) = (Some(phase), 0);
+        (self.from, self.to) = (self.last.clone(), self.last.clone());
+        let way = |a: &Setpoint, b: &Setpoint, speed: f64| -> Result<f64> {
+            let workspace = cell.workspace(name)?;
+            let way = workspace.tip(a).translation.distance(workspace.tip(b).translation);
+            Ok((1.5 * way / speed).max((a.roll() - b.roll()).abs()).max(0.3))
+        };
+        let seconds = match (phase, &step.action) {
+            (Phase::Approach | Phase::Enter, ScriptAction::Grasp(part)) => {
+                let body = bodies_of(cell, &part.organ).first().copied();
+                let body = body.ok_or_else(|| Error::Option(format!("the scene has no organ '{}'", part.organ)))?;
+                let open =
+                    aim::grasp(cell, name, body, Place::InRange(part.range, 0.0), DEPTH, 0.0)?.setpoint.with_jaw(1.0);
+                let near = phase == Phase::Enter;
+                self.to[k] = if near { open } else { cell.workspace(name)?.behind(&open, BACK) };
+                way(&self.from[k], &self.to[k], if near { SLOW } else { FAST })?
+            }
+            (Phase::Close, _) => {
+                self.to[k] = self.to[k].with_jaw(0.0);
+                self.from[k] = self.from[k].with_jaw(0.0);
+                CLOSE_S
+            }
+            (Phase::Move, ScriptAction::Move(by)) => {
+                let tip = cell.workspace(name)?.tip(&self.from[k]);
+                let tip = Pose { translation: tip.translation + 1e-3 * DVec3::from_array(*by), ..tip };
+                let jaw = self.from[k].jaw();
+                self.to[k] = cell.solve(name, &tip, &self.from[k])?.setpoint.with_jaw(jaw);
+                way(&self.from[k], &self.to[k], HELD)?
+            }
+            (Phase::Open, _) => {
+                self.to[k] = self.to[k].with_jaw(1.0);
+                OPEN_S
+            }
+            (Phase::Withdraw, _) => {
+                self.to[k] = cell.workspace(name)?.behind(&self.from[k], BACK);
+                way(&self.from[k], &self.to[k], SLOW)?
+            }
+            _ => 0.3,
+        };
+        let seconds = match phase {
+            Phase::Move | Phase::Wait => step.seconds.unwrap_or(seconds),
+            _ => seconds,
+        };
+        self.count = ((seconds / cell.period()).round() as usize).max(1);
+        Ok(())
+    }
+
+    /// Goes on to what comes after the phase.
+    fn next(&mut self, episode: &Episode) -> Result<()> {
+        let Some(step) = self.script(episode) else { return Ok(()) };
+        let held = holds(episode, step)?;
+        match self.phase {
+            Some(Phase::Approach) => self.enter(episode, Phase::Enter),
+            Some(Phase::Enter) => self.enter(episode, Phase::Close),
+            Some(Phase::Close) if !held && self.tries < TRIES => {
+                self.tries += 1;
+                self.enter(episode, Phase::Approach)
+            }
+            Some(Phase::Open) => self.enter(episode, Phase::Withdraw),
+            _ => {
+                (self.step, self.tries) = (self.step + 1, 0);
+                self.enter_step(episode)
+            }
+        }
+    }
+
+    /// The phase is over, by its time or by what is seen.
+    fn over(&mut self, episode: &Episode) -> Result<bool> {
+        let Some(step) = self.script(episode) else { return Ok(false) };
+        if self.phase == Some(Phase::Close) && self.done > 0 && holds(episode, step)? {
+            return Ok(true);
+        }
+        if let (Some(until), Some(row)) = (&step.until, episode.rows().last())
+            && matches!(self.phase, Some(Phase::Move | Phase::Wait))
+        {
+            let sight = Sight { row, rows: &[], constants: &episode.program().constants };
+            if sight.holds(until, &mut self.until) {
+                return Ok(true);
+            }
+        }
+        Ok(self.done >= self.count)
+    }
+
+    fn act(&mut self, episode: &Episode) -> Result<Vec<Action>> {
+        while self.phase.is_some() && self.over(episode)? {
+            self.next(episode)?;
+        }
+        // What ends a step is looked at in every period; a motion goes on in chunks.
+        let looks = self.script(episode).is_some_and(|s| s.until.is_some());
+        let most = if looks || self.phase.is_none() { 1 } else { CHUNK };
+        let mut chunk = Vec::with_capacity(most);
+        while chunk.len() < most {
+            let targets: Vec<Setpoint> = match self.phase {
+                None => self.last.clone(),
+                Some(_) => {
+                    self.done += 1;
+                    let share = eased(self.done as f64 / self.count as f64);
+                    self.from.iter().zip(&self.to).map(|(a, b)| a.towards(b, share)).collect()
+                }
+            };
+            let mut kept = Vec::with_capacity(targets.len());
+            for ((side, _), target) in episode.cell().arms().into_iter().zip(&targets) {
+                kept.push(episode.cell().workspace(side.name())?.clamp(target));
+            }
+            chunk.push(Action::targets(&kept));
+            self.last = kept;
+            if self.done >= self.count {
+                break;
+            }
+        }
+        Ok(chunk)
+    }
+}
+
+/// Whether the step's arm holds what it is to grasp.
+fn holds(episode: &Episode, step: &ScriptProgram) -> Result<bool> {
+    let k = Steps::arm(episode, step)?;
+    let ScriptAction::Grasp(part) = &step.action else { return Ok(false) };
+    let bodies = bodies_of(episode.cell(), &part.organ);
+    Ok(episode.cell().carried(k).is_some_and(|held| bodies.contains(&held.organ)))
+}
+
+/// The scripted baseline of any task: the steps of its script where it has one, and
+/// [`Scripted`] where it has none.
+#[derive(Clone, Debug)]
+pub struct Baseline {
+    scripted: Scripted,
+    steps: Option<Steps>,
+}
+
+impl Default for Baseline {
+    fn default() -> Self {
+        Self { scripted: Scripted::new(Style::Careful), steps: None }
+    }
+}
+
+impl Policy for Baseline {
+    fn name(&self) -> &str {
+        "scripted"
+    }
+
+    fn begin(&mut self, episode: &Episode, seed: u64) -> Result<()> {
+        if episode.program().script.is_empty() {
+            self.steps = None;
+            return self.scripted.begin(episode, seed);
+        }
+        self.steps = Some(Steps::begin(episode)?);
+        Ok(())
+    }
+
+    fn act(&mut self, episode: &Episode) -> Result<Vec<Action>> {
+        match &mut self.steps {
+            Some(steps) => steps.act(episode),
+            None => self.scripted.act(episode),
+        }
+    }
+
+    fn finished(&self) -> bool {
+        self.steps.is_none() && self.scripted.finished()
+    }
+}

@@ -1,0 +1,96 @@
+//! A task of one's own, from its file to its figures: the scripted steps pass it, its measures are
+//! stored and swept, an abort ends it, and a replay needs nothing but the episode file.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use trocar_scene::{Abort, Scene, ScriptStep, Side, Stage, StageOrder, TaskName};
+use trocar_task::{End, Episode, EpisodeFile, GateRange, Recording, policy, prompt, read_channels, run, sweep};
+use trocar_testing::tube::{ONE_END, resection, two_tubes};
+
+fn stage(name: &str, when: &str) -> Stage {
+    Stage { name: name.to_owned(), when: when.to_owned(), share: 1.0, ..Stage::default() }
+}
+
+fn step(grasp: Option<&str>, move_mm: Option<[f64; 3]>) -> ScriptStep {
+    ScriptStep { arm: Side::Left, grasp: grasp.map(str::to_owned), move_mm, release: false, time_s: None, until: None }
+}
+
+fn pull_aside() -> Scene {
+    let mut scene = resection();
+    let task = &mut scene.task;
+    (task.name, task.prompt) =
+        (TaskName::new("pull-aside").unwrap(), Some("pull the {organ} with {grasper}".to_owned()));
+    task.constants.insert("aside_mm".to_owned(), 3.0);
+    let aside = "attached(left) in organ[0.2, 0.8] and aside(organ[0.4, 0.6]) >= constants.aside_mm";
+    task.stages = vec![
+        stage("grasp", "attached(left) in organ[0.2, 0.8]"),
+        Stage {
+            progress: Some("clamp(aside(organ[0.4, 0.6]) / constants.aside_mm, 0, 1)".to_owned()),
+            ..stage("aside", aside)
+        },
+        Stage { share: 2.0, ..stage("hold", &format!("{aside} for 0.5 s")) },
+    ];
+    let by = ScriptStep {
+        until: Some("aside(organ[0.4, 0.6]) > constants.aside_mm + 1 mm".to_owned()),
+        ..step(None, Some([-10.0, 0.0, 0.0]))
+    };
+    task.script = vec![step(Some("organ[0.4, 0.6]"), None), step(None, Some([0.0, 0.0, 5.0])), by];
+    scene.program().unwrap();
+    scene
+}
+
+fn record(scene: &Scene, seed: u64) -> Recording {
+    let mut episode = Episode::new(scene, &two_tubes(ONE_END, 3e-3), 1).unwrap();
+    let mut scripted = policy::named("scripted").unwrap();
+    run(&mut episode, scripted.as_mut(), seed, &mut |_| true).unwrap()
+}
+
+#[test]
+fn it_is_passed_stored_swept_and_replayed() {
+    let scene = pull_aside();
+    assert!(prompt(&scene).starts_with("pull the tube with the left instrument"), "{}", prompt(&scene));
+    let recording = record(&scene, 1);
+    let s = &recording.summary;
+    assert!(s.passed && s.score == 1.0 && s.end == Some(End::Passed), "{s:?}");
+    let aside = |c: &trocar_task::Channels| c.measures[1];
+    let held_s = |c: &trocar_task::Channels| c.measures[0];
+    assert!(held_s(&recording.channels[0]) == -1.0 && aside(&recording.channels[0]) < 0.1);
+    let last = recording.channels.last().unwrap();
+    assert!((0.2..=0.8).contains(&held_s(last)) && (3.0..8.0).contains(&aside(last)), "{:?}", last.measures);
+
+    let folder = tempfile::tempdir().unwrap();
+    recording.write_into(folder.path()).unwrap();
+    let (info, rows) = read_channels(&folder.path().join("channels.parquet")).unwrap();
+    assert_eq!((&info, &rows), (&recording.info, &recording.channels));
+    let range = GateRange::parse("aside_mm=1,3,50").unwrap();
+    let swept = sweep(&[(info, rows)], &[range], &mut || true).unwrap();
+    assert_eq!(swept.stages, ["grasp", "aside", "hold"]);
+    assert_eq!(swept.rows.iter().map(|r| r.stages[0]).collect::<Vec<_>>(), [3, 3, 1]);
+
+    // What the file says is enough: stages and all.
+    let file = EpisodeFile::read(&folder.path().join("episode.trocar")).unwrap();
+    assert!(scene.task.stages.iter().all(|stage| file.header.scene.contains(&stage.when)), "{}", file.header.scene);
+    let verdict = file.verify(&scene, &two_tubes(ONE_END, 3e-3), 1, &mut || true).unwrap();
+    assert!(verdict.same, "{verdict:?}");
+    let mut other = scene;
+    other.task.stages[2].when = other.task.stages[2].when.replace("0.5 s", "0.6 s");
+    let verdict = file.verify(&other, &two_tubes(ONE_END, 3e-3), 1, &mut || true).unwrap();
+    assert!(!verdict.same && verdict.said.contains("scene"), "{verdict:?}");
+}
+
+#[test]
+fn an_abort_ends_it_and_any_order_is_any() {
+    let mut scene = pull_aside();
+    scene.task.aborts = vec![Abort { name: "too-far".to_owned(), when: "moved(organ[0.4, 0.6]) > 2 mm".to_owned() }];
+    let recording = record(&scene, 1);
+    assert_eq!(recording.summary.end, Some(End::Aborted { name: "too-far".to_owned() }));
+    assert!(!recording.summary.passed && recording.summary.stage >= 1, "{:?}", recording.summary.progress);
+    assert_eq!(recording.summary.why.as_deref(), Some("aborted by the task: too-far"));
+    // The last stage first: what a listed order waits for passes as it happens.
+    scene.task.aborts.clear();
+    scene.task.stages.rotate_right(1);
+    scene.task.episode_s = 8.0;
+    scene.task.order = StageOrder::Any;
+    let recording = record(&scene, 1);
+    let times: Vec<f64> = recording.summary.progress.stages.iter().map(|s| s.time_s.unwrap()).collect();
+    assert!(recording.summary.passed && times[0] > times[1] && times[0] > times[2], "{times:?}");
+}
