@@ -204,9 +204,15 @@ fn a_policy_that_fails_ends_its_episode_and_the_campaign_goes_on() {
         serde_json::json!({"passed": 0, "time-out": 2, "rcm-abort": 0, "diverged": 0, "policy-error": 7, "finished": 0}),
         "{result}"
     );
-    for (seed, why) in
-        [(1, "out of memory"), (2, "after 2 s"), (3, "7"), (4, "NaN"), (5, "5000"), (6, "byte"), (7, "no field 'actions'")]
-    {
+    for (seed, why) in [
+        (1, "out of memory"),
+        (2, "after 2 s"),
+        (3, "7"),
+        (4, "NaN"),
+        (5, "5000"),
+        (6, "byte"),
+        (7, "no field 'actions'"),
+    ] {
         let text = std::fs::read(folder.join(format!("episodes/mine/{seed:06}/result.json"))).unwrap();
         let episode: serde_json::Value = serde_json::from_slice(&text).unwrap();
         let said = episode["end"]["why"].as_str().unwrap();
