@@ -183,7 +183,7 @@ fn a_policy_that_fails_ends_its_episode_and_the_campaign_goes_on() {
         match (number("episode/step") > 0, number("episode/seed")) {
             (true, 1) => Err("out of memory".to_owned()),
             (true, 2) => {
-                std::thread::sleep(Duration::from_millis(1500));
+                std::thread::sleep(Duration::from_secs(5));
                 chunk(1, 10, 0.0)
             }
             (true, 3) => chunk(8, 7, 0.0),
