@@ -67,8 +67,8 @@ fn form() {
             "port[0].normal: invalid length 2, expected an array of length 3",
         ),
         Case(
-            "name = \"left\"\nmodel",
-            "name = \"middle\"§\nmodel",
+            "name = \"left\"\n# A model",
+            "name = \"middle\"§\n# A model",
             "arm[0].name: unknown variant `middle`, expected `left` or `right`",
         ),
     ]);
@@ -190,8 +190,8 @@ fn units() {
             "task.episode_s is 40000; it must be in [0.1, 3600] s; 40000 ms is 40 s",
         ),
         Case(
-            "model = \"franka_fr3\"            #",
-            "model = \"franka_fr3\"\nposture_deg = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]§ #",
+            "model = \"franka_fr3\"\nport = \"left\"",
+            "model = \"franka_fr3\"\nposture_deg = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]§\nport = \"left\"",
             "arm[0].posture_deg[3] is -2.356; it must be in [-174.299, -8.6975] degrees; -2.356 rad is -134.989 degrees",
         ),
     ]);
@@ -218,7 +218,7 @@ fn numbers() {
             "port[0].sheet_thickness_mm is 1e300; it must be in [0, 50] mm",
         ),
         Case("jaw_force_n = 0.5", "jaw_force_n = 0§", "instrument[0].jaw_force_n is 0; it must be in [0.01, 40] N"),
-        Case("friction = 0.6\nfiltered", "friction = -0.6§\nfiltered", "tissue.friction is -0.6; it must be in [0, 5]"),
+        Case("friction = 0.6\n# Organs", "friction = -0.6§\n# Organs", "tissue.friction is -0.6; it must be in [0, 5]"),
         Case("jaw = 0.5", "jaw = 30§", "arm[0].start.jaw is 30; it must be in [0, 1]"),
         Case("control_hz = 30 ", "control_hz = 0§ ", "rates.control_hz is 0; it must be in [1, 1000] Hz"),
         Case("size_px = [848, 480]", "size_px = [0, 480]§", "camera[1].size_px[0] is 0; it must be in [1, 8192] px"),
@@ -365,18 +365,18 @@ fn names() {
             "camera[1].name is 'endoscope', which camera[0] already has; names must be unique",
         ),
         Case(
-            "model = \"franka_fr3\"            #",
-            "model = \"franka_fr4\"§ #",
+            "model = \"franka_fr3\"\nport = \"left\"",
+            "model = \"franka_fr4\"§\nport = \"left\"",
             "arm[0].model is 'franka_fr4'; it must be franka_fr3 or a file that ends in .urdf, .xml or .mjcf",
         ),
         Case(
-            "model = \"franka_fr3\"            #",
-            "model = \"../arms/absent.urdf\"§ #",
+            "model = \"franka_fr3\"\nport = \"left\"",
+            "model = \"../arms/absent.urdf\"§\nport = \"left\"",
             "arm[0].model is ../arms/absent.urdf, which is no file; it must be a path from the scene file's folder",
         ),
         Case(
-            "model = \"franka_fr3\"            #",
-            "model = \"franka_fr3\"\nposture_deg = [0.0]§ #",
+            "model = \"franka_fr3\"\nport = \"left\"",
+            "model = \"franka_fr3\"\nposture_deg = [0.0]§\nport = \"left\"",
             "arm[0].posture_deg has 1 angles; it must have 7 for an FR3",
         ),
     ]);
@@ -482,8 +482,7 @@ fn files() {
     );
     assert_eq!(read(&[0xff, 0xfe]), "/scene.toml: stream did not contain valid UTF-8");
     assert_eq!(read(b""), "/scene.toml: line 1: missing field `name`");
-    let unknown =
-        "no scene 'cell-b'; it must be a TOML file or one of the built-in scenes cell-a; did you mean 'cell-a'?";
+    let unknown = "no scene 'cell-b'; it must be a TOML file or one of the built-in scenes cell-a, cell-a-retraction; did you mean 'cell-a'?";
     assert_eq!(Scene::read("cell-b").unwrap_err().to_string(), unknown);
     let absent = Scene::read("absent/scene.toml").unwrap_err().to_string();
     assert_eq!(absent, "absent/scene.toml: No such file or directory (os error 2)");
