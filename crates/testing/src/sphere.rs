@@ -84,7 +84,7 @@ pub fn write(dir: &Path, info: &RecordingInfo, frames: usize) {
     write_moving(dir, info, frames, |_| CENTRE);
 }
 
-/// [`write`] with the sphere's centre at `centre(frame)` (m); its mask is that of `CENTRE`.
+/// [`write()`] with the sphere's centre at `centre(frame)` (m); its mask is that of `CENTRE`.
 pub fn write_moving(dir: &Path, info: &RecordingInfo, frames: usize, centre: impl Fn(usize) -> DVec3) {
     let camera = info.camera.unwrap();
     let mask = scene(&camera).2;
