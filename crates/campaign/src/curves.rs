@@ -1,4 +1,4 @@
-//! Robustness: the share of episodes that passed, over the values of what varied.
+//! Robustness curves: the share of episodes that passed, by the values of a factor.
 
 use crate::by::{By, Value};
 use crate::store::EpisodeRecord;

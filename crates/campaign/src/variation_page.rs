@@ -1,5 +1,5 @@
-//! The sections of a campaign's page on what varied: the factors, success over each of them, and
-//! what was drawn for every episode.
+//! The sections of a campaign's page on variation: the factors, success by factor, and the drawn
+//! values of every episode.
 
 use crate::curves::{Curve, significant};
 use crate::drawn_result::words;

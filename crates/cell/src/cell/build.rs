@@ -220,8 +220,8 @@ pub(super) fn start(start: &Start, port: Option<&trocar_scene::Port>, workspace:
     }
 }
 
-/// The rolls (rad) that an arm reaches from its start without a joint at a limit, for every tilt of
-/// the shaft up to [`LEAN`]: the wrist's range less the part that the tilt uses. Tilts that the arm
+/// The range of roll (rad) that an arm reaches from its start within its joint limits, at any tilt
+/// of the shaft up to [`LEAN`]: the wrist's range less the part that the tilt uses. Tilts that the arm
 /// cannot reach even at the start's roll are left out: commands there are held back.
 fn roll_of(
     arm: &SerialArm,

@@ -30,7 +30,7 @@ pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Re
     Ok(())
 }
 
-/// Success over each value of what was asked for.
+/// Success by the factors of `--by`.
 fn curves(r: &CampaignResult) -> String {
     let mut lines = String::new();
     for curve in &r.by {

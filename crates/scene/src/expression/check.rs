@@ -148,10 +148,9 @@ impl Checker<'_> {
                 Ok(Condition::Within(held, low, high))
             }
             ("in_mouth", None) => Ok(Condition::Flag(self.measure(what.at, Measure::InMouth(side, organ_name))?)),
-            ("in_mouth", Some(_)) => Err(Mistake::new(
-                organ.at,
-                "in_mouth(ARM) is told of a whole organ, such as in_mouth(right) in organ.cecum",
-            )),
+            ("in_mouth", Some(_)) => {
+                Err(Mistake::new(organ.at, "in_mouth(ARM) needs a whole organ, such as in_mouth(right) in organ.cecum"))
+            }
             _ => Err(Mistake::new(what.at, usage)),
         }
     }

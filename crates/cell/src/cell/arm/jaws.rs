@@ -55,7 +55,7 @@ impl ArmUnit {
         }
     }
 
-    /// Counts the frames for which jaws that closed on tissue have stood where they were told to.
+    /// Counts the frames for which jaws that closed on tissue have stood at their commanded opening.
     fn count_standing(&mut self, wanted: f64, opening: f64, force: f64) {
         let state = &mut self.state;
         // Shut blades hold nothing.
@@ -68,7 +68,7 @@ impl ArmUnit {
         };
     }
 
-    /// Takes hold of what is between the blades, which press on it with `closing` (N).
+    /// Grasps the tissue between the blades, which press on it with `closing` (N).
     fn take_hold(&mut self, closing: f64, world: &mut World, events: &mut Vec<CellEvent>) {
         let (region, opening) = (self.jaw_region(), self.opening());
         let Self { model, state, .. } = self;
