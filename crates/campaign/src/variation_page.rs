@@ -65,15 +65,17 @@ pub(super) fn varied(manifest: &Manifest, r: &CampaignResult, records: &[Episode
     page::section("Variation", &lead, &table::plain(&names, &rows))
 }
 
-/// Success over each thing that varied; empty if nothing did.
+/// Success by factor; empty if nothing varied. A factor with a single bin of episodes is left out:
+/// nothing can be compared in it.
 pub(super) fn curves(r: &CampaignResult) -> Result<String> {
-    if r.by.is_empty() {
+    let shown: Vec<&Curve> = r.by.iter().filter(|curve| curve.bins.len() > 1).collect();
+    if shown.is_empty() {
         return Ok(String::new());
     }
     let mut figures = Vec::new();
     let policies: Vec<&str> = r.policies.iter().map(|p| p.policy.as_str()).collect();
     let (mut wide, mut tables) = (String::new(), String::new());
-    for curve in &r.by {
+    for curve in &shown {
         if curve.bins.iter().all(|bin| bin.numbers.is_some()) {
             figures.push(plots::success_over(&policies, curve)?);
         } else {
@@ -84,12 +86,12 @@ pub(super) fn curves(r: &CampaignResult) -> Result<String> {
     let lead = "Share of episodes that passed, over what was drawn. Numbers are in bins of equally many episodes; a \
                 point is at the median of its bin. Whiskers: Wilson, 95%. Several factors vary at once, so a curve is \
                 over all values of the others.";
-    let body = weakest(r) + &wide + &page::grid(Columns::Two, &figures) + &page::fold("All values", &tables);
+    let body = weakest(r, &shown) + &wide + &page::grid(Columns::Two, &figures) + &page::fold("All values", &tables);
     Ok(page::section("Success by factor", lead, &body))
 }
 
 /// For each policy and factor the value with the least success.
-fn weakest(r: &CampaignResult) -> String {
+fn weakest(r: &CampaignResult, curves: &[&Curve]) -> String {
     let cell = |curve: &Curve, policy: usize| {
         let shares = curve.bins.iter().filter_map(|bin| Some((bin, bin.policies.get(policy)?)));
         // The first of equals.
@@ -100,10 +102,10 @@ fn weakest(r: &CampaignResult) -> String {
     };
     let head: Vec<&str> =
         ["least success at"].into_iter().chain(r.policies.iter().map(|p| p.policy.as_str())).collect();
-    let row = |curve: &Curve| {
+    let row = |curve: &&Curve| {
         std::iter::once(curve.label.clone()).chain((0..r.policies.len()).map(|k| cell(curve, k))).collect::<Vec<_>>()
     };
-    table::plain(&head, &r.by.iter().map(row).collect::<Vec<_>>())
+    table::plain(&head, &curves.iter().map(row).collect::<Vec<_>>())
 }
 
 fn by_value(curve: &Curve) -> String {
