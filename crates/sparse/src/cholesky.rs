@@ -1,7 +1,7 @@
 //! The factor: a multifrontal Cholesky factorisation over the tree of supernodes (Duff and Reid,
 //! "The multifrontal solution of indefinite sparse symmetric linear equations", 1983).
 
-use crate::dense::{COLUMNS, eliminate, first_of_band, inverse_bands};
+use crate::dense::{COLUMNS, eliminate, first_of_band, has_threads, inverse_bands};
 use crate::dissection::{Graph, dissect};
 use crate::supernodes::{Supernode, elimination_tree, postorder, supernodes};
 use crate::{BlockMatrix, Real};
@@ -74,8 +74,8 @@ impl<T: Real> Cholesky<T> {
 
     /// Factorises the matrix whose blocks of the lower triangle are `blocks`, column by column, in
     /// the order of [`BlockMatrix::blocks`]. Vectors of `level` are used, and the threads of the
-    /// current pool; the bits depend on neither. False if the matrix is not positive definite: the
-    /// factor is then of no use.
+    /// rayon pool that calls; outside of a pool the caller does all the work. The bits depend on
+    /// neither. False if the matrix is not positive definite: the factor is then of no use.
     pub fn factorise(&mut self, level: Level, blocks: impl ExactSizeIterator<Item = [[T; 3]; 3]>) -> bool {
         assert_eq!(blocks.len(), self.places.len(), "the matrix has another pattern than the one analysed");
         self.numbers.fill(T::default());
@@ -118,7 +118,7 @@ impl<T: Real> Cholesky<T> {
             below = others;
             (child, own)
         });
-        if supernode.children.len() > 1 && self.work[s] > SHARED && rayon::current_num_threads() > 1 {
+        if supernode.children.len() > 1 && self.work[s] > SHARED && has_threads() {
             let tasks: Vec<_> = tasks.collect();
             let parts: Vec<_> =
                 tasks.into_par_iter().map(|(child, own)| (child, self.subtree(level, child, own))).collect();

@@ -91,9 +91,15 @@ fn bands<T: Real>(mut update: &mut [T]) -> Vec<&mut [T]> {
     list
 }
 
+/// Whether the caller is in a pool of several threads. Outside of one it does all the work: the
+/// global pool is not for it.
+pub(crate) fn has_threads() -> bool {
+    rayon::current_thread_index().is_some() && rayon::current_num_threads() > 1
+}
+
 /// Calls `f` with each item, on several threads if the `work` is worth it.
 fn for_each<I: Send>(items: impl Iterator<Item = I>, work: usize, f: impl Fn(I) + Sync) {
-    if work > SHARED && rayon::current_num_threads() > 1 {
+    if work > SHARED && has_threads() {
         items.collect::<Vec<_>>().into_par_iter().for_each(&f);
     } else {
         items.for_each(f);

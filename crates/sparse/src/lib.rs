@@ -3,7 +3,7 @@
 //!
 //! [`BlockMatrix`] is the matrix, [`Cholesky`] its factor. An elimination order is found by nested
 //! dissection once for a pattern, and numbers follow as often as needed. Independent subtrees and
-//! large fronts share the threads of the current rayon pool. The bits of a factor depend neither on
+//! large fronts share the threads of the rayon pool that calls. The bits of a factor depend neither on
 //! the number of threads nor on the instruction set.
 
 mod cholesky;
