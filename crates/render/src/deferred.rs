@@ -7,9 +7,10 @@ use crate::picture::Rows;
 use crate::raster::{LANES, NOTHING, Vec8, View, Visibility, dot, splat};
 use crate::rays::TILE;
 use crate::shading_frame::offset;
-use crate::stage::{BundleCandidates, Stage};
+use crate::stage::{BundleCandidates, Stage, Surfaces, turned};
 use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x8};
 use glam::Vec3A;
+use std::ops::Range;
 
 /// Buffers that a thread reuses from band to band.
 pub(crate) struct Buffers {
@@ -26,17 +27,6 @@ struct Waiting {
     /// From the lamp to slightly above the surface.
     direction: Vec3A,
     light: Vec3A,
-}
-
-/// Surface points of eight pixels, by axis.
-#[derive(Default)]
-struct Points {
-    position: [[f32; LANES]; 3],
-    normal: [[f32; LANES]; 3],
-    albedo: [[f32; LANES]; 3],
-    to_eye: [[f32; LANES]; 3],
-    flat: [Vec3A; LANES],
-    body: [u32; LANES],
 }
 
 /// A picture that is being shaded.
@@ -80,15 +70,14 @@ impl Shading<'_> {
         let width = self.view.rays.width();
         buffers.waiting.resize_with(self.stage.lamps().len(), Vec::new);
         let count = rows.depth.len() / width;
-        let mut points = Points::default();
-        let mut body = 0;
+        let mut body = (0, 0..0);
         let mut top = 0;
         while top < count {
             let mut left = 0;
             while left < width {
                 let mut row = top;
                 while row < count.min(top + TILE) {
-                    self.pixels(simd, [left, first + row], row * width + left, rows, &mut points, &mut body, buffers);
+                    self.pixels(simd, [left, first + row], row * width + left, rows, &mut body, buffers);
                     row += 1;
                 }
                 if self.shadows {
@@ -101,7 +90,6 @@ impl Shading<'_> {
     }
 
     /// Shades up to eight pixels of a row from pixel `u`, `v`; `to` is their place in `rows`.
-    #[allow(clippy::too_many_arguments, reason = "one call")]
     #[inline(always)]
     fn pixels<S: Simd>(
         &self,
@@ -109,56 +97,59 @@ impl Shading<'_> {
         [u, v]: [usize; 2],
         to: usize,
         rows: &mut Rows<'_>,
-        points: &mut Points,
-        body: &mut usize,
+        body: &mut (usize, Range<u32>),
         buffers: &mut Buffers,
     ) {
         let Self { stage, view, visibility, .. } = self;
         let at = v * view.rays.stride() + u;
         let count = LANES.min(view.rays.width() - u);
-        let to_camera = view.rotation.transpose();
+        let numbers = &visibility.triangle[at..at + LANES];
+        let [x, y, z] = view.rays.axes();
+        let mut bodies = [0; LANES];
         let mut open = 0_u64;
         for lane in 0..count {
-            let number = visibility.triangle[at + lane];
-            if number == NOTHING {
-                (rows.depth[to + lane], rows.labels[to + lane]) = (0.0, 0);
-                rows.normals[to + lane] = [0.0; 3];
-                let seen = view.rays.through(u + lane, v).x == view.rays.through(u + lane, v).x;
-                rows.light[to + lane] = if seen { stage.environment } else { [0.0; 3] };
+            if numbers[lane] != NOTHING {
+                if !body.1.contains(&numbers[lane]) {
+                    *body = stage.body_of(numbers[lane]);
+                }
+                bodies[lane] = body.0;
+                open |= 1 << lane;
                 continue;
             }
-            *body = stage.body_of(number, *body);
-            let ray = view.rays.through(u + lane, v);
-            let direction = view.rotation * ray;
-            let t = visibility.depth[at + lane];
-            let surface = stage.surface_along(*body, number, view.origin, direction, t);
-            let to_eye = -direction.normalize();
-            for k in 0..3 {
-                points.position[k][lane] = surface.position[k];
-                points.normal[k][lane] = surface.smooth[k];
-                points.albedo[k][lane] = surface.albedo[k];
-                points.to_eye[k][lane] = to_eye[k];
-            }
-            points.flat[lane] = surface.flat;
-            points.body[lane] = *body as u32;
-            rows.depth[to + lane] = (t * ray.z).max(0.0);
-            rows.labels[to + lane] = stage.label_of(*body);
-            rows.normals[to + lane] = (to_camera * surface.smooth).to_array();
-            open |= 1 << lane;
+            (rows.depth[to + lane], rows.labels[to + lane]) = (0.0, 0);
+            rows.normals[to + lane] = [0.0; 3];
+            rows.light[to + lane] = if x[at + lane].is_nan() { [0.0; 3] } else { stage.environment };
         }
+        if open == 0 {
+            return;
+        }
+        let ray = [
+            f32x8::from_slice(simd, &x[at..at + LANES]),
+            f32x8::from_slice(simd, &y[at..at + LANES]),
+            f32x8::from_slice(simd, &z[at..at + LANES]),
+        ];
+        let t = f32x8::from_slice(simd, &visibility.depth[at..at + LANES]);
+        let depth: [f32; LANES] = (t * ray[2]).max(splat(simd, 0.0)).into();
+        let to_camera = view.rotation.transpose();
         while open != 0 {
-            let first = points.body[open.trailing_zeros() as usize & (LANES - 1)];
+            let body = bodies[open.trailing_zeros() as usize & (LANES - 1)];
             let mut group = 0;
             for lane in 0..LANES {
-                group |= u64::from(points.body[lane] == first) << lane;
+                group |= u64::from(bodies[lane] == body) << lane;
             }
             group &= open;
             open &= !group;
-            let light = self.light(simd, first as usize, group, to, points, buffers);
-            for lane in 0..LANES {
-                if group >> lane & 1 == 1 {
-                    rows.light[to + lane] = [light[0][lane], light[1][lane], light[2][lane]];
-                }
+            let surfaces = stage.surfaces(simd, body, numbers, group, view, &ray, t);
+            let [x, y, z] = self.light(simd, body, group, to, &surfaces, buffers);
+            let normal = turned(&to_camera, &surfaces.smooth);
+            let [a, b, c]: [[f32; LANES]; 3] = [normal[0].into(), normal[1].into(), normal[2].into()];
+            let label = stage.label_of(body);
+            while group != 0 {
+                let lane = group.trailing_zeros() as usize & (LANES - 1);
+                group &= group - 1;
+                rows.light[to + lane] = [x[lane], y[lane], z[lane]];
+                rows.normals[to + lane] = [a[lane], b[lane], c[lane]];
+                (rows.depth[to + lane], rows.labels[to + lane]) = (depth[lane], label);
             }
         }
     }
@@ -172,26 +163,23 @@ impl Shading<'_> {
         body: usize,
         group: u64,
         to: usize,
-        points: &Points,
+        points: &Surfaces<S>,
         buffers: &mut Buffers,
     ) -> [[f32; LANES]; 3] {
         let material = self.stage.material_of(body);
-        let position = load(simd, &points.position);
-        let normal = load(simd, &points.normal);
-        let albedo = load(simd, &points.albedo);
-        let to_eye = load(simd, &points.to_eye);
+        let Surfaces { position, smooth: normal, albedo, to_eye, .. } = points;
         let zero = splat(simd, 0.0);
         // Metal mirrors the room: approximately darker towards grazing angles, where it mirrors
         // what lies behind it.
-        let ambient = if material.is_metal() { dot(normal, to_eye) * 0.85 + 0.35 } else { splat(simd, 1.0) };
+        let ambient = if material.is_metal() { dot(*normal, *to_eye) * 0.85 + 0.35 } else { splat(simd, 1.0) };
         let environment = self.stage.environment;
         let mut sum = [zero; 3];
         for k in 0..3 {
             sum[k] = albedo[k] * ambient * environment[k];
         }
         for (number, lamp) in self.stage.lamps().iter().enumerate() {
-            let arriving = lamp.arriving_at(simd, &position);
-            let back = material.lit(simd, &albedo, &normal, &to_eye, &arriving.direction);
+            let arriving = lamp.arriving_at(simd, position);
+            let back = material.lit(simd, albedo, normal, to_eye, &arriving.direction);
             let mut added = [zero; 3];
             for k in 0..3 {
                 added[k] = back[k] * arriving.light[k];
@@ -202,17 +190,17 @@ impl Shading<'_> {
                 let beside = (apart * apart).simd_gt(splat(simd, lamp.centre().distance_squared(self.view.origin)));
                 let lit = (added[0] + added[1] + added[2]).simd_gt(zero);
                 let mut lanes = !beside.to_bitmask() & lit.to_bitmask() & group;
-                let values: [[f32; LANES]; 3] = [added[0].into(), added[1].into(), added[2].into()];
+                let values = lanes_of(&added);
+                let (positions, flats) = (lanes_of(position), lanes_of(&points.flat));
                 while lanes != 0 {
                     let lane = lanes.trailing_zeros() as usize & (LANES - 1);
                     lanes &= lanes - 1;
-                    let [x, y, z] = &points.position;
-                    let position = Vec3A::new(x[lane], y[lane], z[lane]);
-                    let flat = points.flat[lane];
+                    let position = one(&positions, lane);
+                    let flat = one(&flats, lane);
                     let direction = position + flat * offset(position) - lamp.centre();
                     // A surface that faces away from the lamp is in its own shadow.
                     if direction.dot(flat) < 0.0 {
-                        let light = Vec3A::new(values[0][lane], values[1][lane], values[2][lane]);
+                        let light = one(&values, lane);
                         buffers.waiting[number].push(Waiting { pixel: to + lane, direction, light });
                     }
                 }
@@ -248,6 +236,11 @@ impl Shading<'_> {
 }
 
 #[inline(always)]
-fn load<S: Simd>(simd: S, from: &[[f32; LANES]; 3]) -> Vec8<S> {
-    [f32x8::from_slice(simd, &from[0]), f32x8::from_slice(simd, &from[1]), f32x8::from_slice(simd, &from[2])]
+fn lanes_of<S: Simd>(v: &Vec8<S>) -> [[f32; LANES]; 3] {
+    [v[0].into(), v[1].into(), v[2].into()]
+}
+
+#[inline(always)]
+fn one(v: &[[f32; LANES]; 3], lane: usize) -> Vec3A {
+    Vec3A::new(v[0][lane], v[1][lane], v[2][lane])
 }

@@ -18,6 +18,8 @@ pub struct RayGenerator {
     /// Rays through pixel centres, by axis, in rows of `stride`; NaN where nothing is visible and
     /// beyond the picture. Rays of a pinhole have z = 1, rays of a fisheye have length 1.
     centres: [Vec<f32>; 3],
+    /// The same, one ray after the other; the last number is not used.
+    each: Vec<[f32; 4]>,
     stride: usize,
     /// Rays through pixel corners: one row and one column more than there are pixels. Only paths
     /// need them.
@@ -58,6 +60,7 @@ impl RayGenerator {
             height,
             model,
             centres,
+            each: Vec::new(),
             stride,
             corners: OnceLock::new(),
             circle: None,
@@ -65,7 +68,7 @@ impl RayGenerator {
             tiles: TileBounds::default(),
         };
         rays.projection = Projection::new(&rays.model, &rays);
-        rays.tiles = TileBounds::of(&rays);
+        rays.finish();
         rays
     }
 
@@ -81,8 +84,15 @@ impl RayGenerator {
                 self.centres.iter_mut().for_each(|axis| axis[at] = f32::NAN);
             }
         }
-        self.tiles = TileBounds::of(&self);
+        self.finish();
         self
+    }
+
+    /// Derives what follows from the rays.
+    fn finish(&mut self) {
+        let [x, y, z] = &self.centres;
+        self.each = x.iter().zip(y).zip(z).map(|((x, y), z)| [*x, *y, *z, 0.0]).collect();
+        self.tiles = TileBounds::of(self);
     }
 
     /// Width (px).
@@ -104,6 +114,11 @@ impl RayGenerator {
     /// visible and beyond the picture.
     pub(crate) fn axes(&self) -> &[Vec<f32>; 3] {
         &self.centres
+    }
+
+    /// The rays of [`Self::axes`] one after the other; the last number is not used.
+    pub(crate) fn each(&self) -> &[[f32; 4]] {
+        &self.each
     }
 
     pub(crate) fn projection(&self) -> &Projection {

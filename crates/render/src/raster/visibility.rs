@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 /// Rows of a band, a multiple of a tile's. Fewer give more clusters that are in two bands, more
 /// give less to do in parallel.
-pub(crate) const BAND: usize = 56;
+pub(crate) const BAND: usize = 112;
 
 /// Marks a pixel without a triangle.
 pub(crate) const NOTHING: u32 = u32::MAX;
