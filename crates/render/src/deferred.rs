@@ -3,12 +3,13 @@
 use crate::bvh::Stacks;
 use crate::direct::{BESIDE_EYE_SHARE, SHADOW_RAY_END};
 use crate::material::only;
+use crate::background::Behind;
 use crate::picture::Rows;
 use crate::raster::{LANES, NOTHING, Vec8, View, Visibility, dot, splat};
 use crate::rays::TILE;
 use crate::shading_frame::offset;
 use crate::stage::{BundleCandidates, Stage, Surfaces, turned};
-use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x8};
+use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x8, u32x8};
 use glam::Vec3A;
 use std::ops::Range;
 
@@ -19,6 +20,8 @@ pub(crate) struct Buffers {
     directions: Vec<Vec3A>,
     candidates: BundleCandidates,
     stacks: Stacks,
+    /// Which parts of [`LANES`] pixels of the rows are not as those behind.
+    pub shaded: Vec<bool>,
 }
 
 /// A pixel of a band and the light that a lamp may add to it.
@@ -35,6 +38,8 @@ pub(crate) struct Shading<'a> {
     pub view: &'a View<'a>,
     pub visibility: &'a Visibility,
     pub shadows: bool,
+    /// What the rows hold already.
+    pub behind: Option<Behind<'a>>,
 }
 
 impl Buffers {
@@ -44,11 +49,17 @@ impl Buffers {
             directions: Vec::new(),
             candidates: BundleCandidates::default(),
             stacks: Stacks::new(),
+            shaded: Vec::new(),
         }
     }
 }
 
-impl Shading<'_> {
+impl<'a> Shading<'a> {
+    /// Of all pixels, without shadows.
+    pub fn new(stage: &'a Stage, view: &'a View<'a>, visibility: &'a Visibility) -> Self {
+        Self { stage, view, visibility, shadows: false, behind: None }
+    }
+
     /// Whether a lamp may cast a shadow that the eye sees.
     pub fn may_cast(&self) -> bool {
         let eye = self.view.origin;
@@ -70,6 +81,9 @@ impl Shading<'_> {
         let width = self.view.rays.width();
         buffers.waiting.resize_with(self.stage.lamps().len(), Vec::new);
         let count = rows.depth.len() / width;
+        let parts = width.div_ceil(LANES);
+        buffers.shaded.clear();
+        buffers.shaded.resize(count * parts, false);
         let mut body = (0, 0..0);
         let mut top = 0;
         while top < count {
@@ -77,7 +91,11 @@ impl Shading<'_> {
             while left < width {
                 let mut row = top;
                 while row < count.min(top + TILE) {
-                    self.pixels(simd, [left, first + row], row * width + left, rows, &mut body, buffers);
+                    let fresh = self.fresh(simd, [left, first + row]);
+                    if fresh != 0 {
+                        buffers.shaded[row * parts + left / LANES] = true;
+                        self.pixels(simd, fresh, [left, first + row], row * width + left, rows, &mut body, buffers);
+                    }
                     row += 1;
                 }
                 if self.shadows {
@@ -89,11 +107,24 @@ impl Shading<'_> {
         }
     }
 
-    /// Shades up to eight pixels of a row from pixel `u`, `v`; `to` is their place in `rows`.
+    /// Which of eight pixels of a row from pixel `u`, `v` are not as those behind.
+    #[inline(always)]
+    fn fresh<S: Simd>(&self, simd: S, [u, v]: [usize; 2]) -> u64 {
+        let at = v * self.view.rays.stride() + u;
+        let within = (1 << LANES.min(self.view.rays.width() - u)) - 1;
+        let Some(Behind { visibility: behind, .. }) = self.behind else { return within };
+        let now = u32x8::from_slice(simd, &self.visibility.triangle[at..at + LANES]);
+        let before = u32x8::from_slice(simd, &behind.triangle[at..at + LANES]);
+        !now.simd_eq(before).to_bitmask() & within
+    }
+
+    /// Shades the pixels `fresh` of eight in a row from pixel `u`, `v`; `to` is their place in `rows`.
+    #[allow(clippy::too_many_arguments, reason = "one call")]
     #[inline(always)]
     fn pixels<S: Simd>(
         &self,
         simd: S,
+        fresh: u64,
         [u, v]: [usize; 2],
         to: usize,
         rows: &mut Rows<'_>,
@@ -102,12 +133,14 @@ impl Shading<'_> {
     ) {
         let Self { stage, view, visibility, .. } = self;
         let at = v * view.rays.stride() + u;
-        let count = LANES.min(view.rays.width() - u);
         let numbers = &visibility.triangle[at..at + LANES];
         let [x, y, z] = view.rays.axes();
         let mut bodies = [0; LANES];
         let mut open = 0_u64;
-        for lane in 0..count {
+        for lane in 0..LANES {
+            if fresh >> lane & 1 == 0 {
+                continue;
+            }
             if numbers[lane] != NOTHING {
                 if !body.1.contains(&numbers[lane]) {
                     *body = stage.body_of(numbers[lane]);
@@ -216,7 +249,7 @@ impl Shading<'_> {
     /// Adds the waiting light of a tile where no surface blocks it. Rays start at the lamp, so
     /// those of a tile form a bundle.
     fn cast(&self, rows: &mut Rows<'_>, buffers: &mut Buffers) {
-        let Buffers { waiting, directions, candidates, stacks } = buffers;
+        let Buffers { waiting, directions, candidates, stacks, .. } = buffers;
         for (lamp, waiting) in self.stage.lamps().iter().zip(waiting) {
             if waiting.is_empty() {
                 continue;

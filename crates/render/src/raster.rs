@@ -9,18 +9,17 @@
 //! nothing is clipped.
 //!
 //! No operation is fused and lanes never interact, so every instruction set gives the same bits. A
-//! pixel's triangles are tested in the same order in any band.
+//! pixel shows the nearest triangle in whatever order triangles are drawn.
 
-mod band;
 mod clusters;
 mod projection;
 mod triangle;
-mod visibility;
+mod view;
 
-pub(crate) use clusters::Clusters;
+pub(crate) use clusters::{Cluster, Clusters};
 pub(crate) use projection::Projection;
-pub(crate) use triangle::{cross, dot, minus};
-pub(crate) use visibility::{BAND, NOTHING, View, Visibility};
+pub(crate) use triangle::{Eight, One, cross, dot, minus};
+pub(crate) use view::{NOTHING, View, Visibility};
 
 use fearless_simd::{Simd, SimdBase, SimdCombine, f32x4, f32x8};
 

@@ -105,6 +105,11 @@ impl RayGenerator {
         self.height
     }
 
+    /// What the rays follow from: the camera model, and the radius of the circular image (px).
+    pub(crate) fn lens(&self) -> (CameraModel, Option<f32>) {
+        (self.model, self.circle)
+    }
+
     /// Numbers of a row of [`Self::axes`].
     pub(crate) fn stride(&self) -> usize {
         self.stride

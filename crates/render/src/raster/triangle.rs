@@ -7,7 +7,7 @@ use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x8, u32x8};
 ///
 /// The planes through the eye and the edges face inward, and the plane of the triangle faces away
 /// from the eye.
-pub(super) struct Eight<S: Simd> {
+pub(crate) struct Eight<S: Simd> {
     edges: [Vec8<S>; 3],
     plane: Vec8<S>,
     /// Distance of the plane from the eye, times the length of its normal.
@@ -18,10 +18,10 @@ pub(super) struct Eight<S: Simd> {
 }
 
 /// Numbers of [`Eight`] in memory, by lane last.
-pub(super) struct Stored([[f32; 8]; 15]);
+pub(crate) struct Stored([[f32; 8]; 15]);
 
 /// One triangle in all lanes.
-pub(super) struct One<S: Simd> {
+pub(crate) struct One<S: Simd> {
     edges: [Vec8<S>; 3],
     plane: Vec8<S>,
     offset: f32x8<S>,
@@ -126,9 +126,10 @@ impl<S: Simd> One<S> {
         }
         let t = (self.offset / dot(ray, self.plane)).max(self.near).min(self.far);
         let before = f32x8::from_slice(simd, &depth[at..at + 8]);
-        let nearest = inside & t.simd_lt(before) & t.simd_gt(zero);
-        nearest.select(t, before).store_slice(&mut depth[at..at + 8]);
         let held = u32x8::from_slice(simd, &triangle[at..at + 8]);
+        let nearer = t.simd_lt(before) | (t.simd_eq(before) & self.number.simd_lt(held));
+        let nearest = inside & nearer & t.simd_gt(zero);
+        nearest.select(t, before).store_slice(&mut depth[at..at + 8]);
         nearest.select(self.number, held).store_slice(&mut triangle[at..at + 8]);
     }
 

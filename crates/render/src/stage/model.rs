@@ -1,10 +1,11 @@
 //! A stage: shapes, some of which deform, and the bodies that show them at a pose.
 
 use super::surface::{Vertex, vector};
+use crate::background::Memory;
 use crate::bvh::{Bounds, BoxTree, Ray, TriangleTree};
 use crate::light::{Lamp, Light};
 use crate::material::{Appearance, Material};
-use crate::raster::{Clusters, Vec8, View, Visibility};
+use crate::raster::{Clusters, Vec8, View};
 use crate::{Error, Result, srgb};
 use fearless_simd::{Level, Simd};
 use glam::{DVec3, Mat3A, Quat, Vec3A};
@@ -43,8 +44,10 @@ pub struct Stage {
     lamps: Vec<Lamp>,
     stale: bool,
     pub(crate) level: Level,
-    /// Memory for pictures.
-    pub(crate) visibility: Visibility,
+    /// Number of changes of shapes and bodies so far.
+    changes: u64,
+    /// Memory for previews.
+    pub(crate) memory: Memory,
     /// Lights, in the world frame.
     pub lights: Vec<Light>,
     /// Linear radiance of the uniform environment.
@@ -56,6 +59,8 @@ pub(super) struct Shape {
     pub(super) tree: Arc<TriangleTree>,
     /// Whether the vertices have moved since the tree was fitted.
     tree_stale: bool,
+    /// Number of its last change.
+    change: u64,
     clusters: Clusters,
     positions: Arc<Vec<Vec3A>>,
     triangles: Arc<Vec<[u32; 3]>>,
@@ -67,6 +72,8 @@ pub(super) struct Shape {
 #[derive(Clone, Debug)]
 pub(super) struct Body {
     pub(super) shape: usize,
+    /// Number of its last change of pose.
+    change: u64,
     label: u16,
     /// Number of its first triangle among those of all bodies.
     pub(super) first_triangle: u32,
@@ -123,7 +130,8 @@ impl Stage {
             lamps: Vec::new(),
             stale: true,
             level: Level::new(),
-            visibility: Visibility::default(),
+            changes: 0,
+            memory: Memory::default(),
             lights: Vec::new(),
             environment: [0.0; 3],
         }
@@ -152,6 +160,7 @@ impl Stage {
             clusters: Clusters::new(mesh, &positions, tree.order()),
             tree: Arc::new(tree),
             tree_stale: false,
+            change: 0,
             positions: Arc::new(positions),
             triangles: Arc::new(mesh.triangles.clone()),
             vertices: Arc::new(vertices),
@@ -181,6 +190,8 @@ impl Stage {
         found.clusters.follow(&found.positions);
         found.tree_stale = true;
         found.update_vertices();
+        self.changes += 1;
+        found.change = self.changes;
         self.stale = true;
         Ok(())
     }
@@ -201,6 +212,7 @@ impl Stage {
         }
         self.bodies.push(Body {
             shape: shape.0,
+            change: 0,
             label,
             first_triangle: first_triangle as u32,
             path_material: Arc::new(Material::new(&appearance.surface.for_paths())),
@@ -212,6 +224,7 @@ impl Stage {
             translation: Vec3A::ZERO,
         });
         let id = BodyId(self.bodies.len() - 1);
+        self.stale = true;
         self.place(id, pose)?;
         Ok(id)
     }
@@ -223,10 +236,15 @@ impl Stage {
     pub fn place(&mut self, body: BodyId, pose: &Pose) -> Result<()> {
         let unknown = Error::Unknown { what: "body", index: body.0, count: self.bodies.len() };
         let body = self.bodies.get_mut(body.0).ok_or(unknown)?;
-        body.is_identity = *pose == Pose::IDENTITY;
-        body.rotation = rotation_of(pose);
-        body.inverse_rotation = body.rotation.transpose();
-        body.translation = pose.translation.as_vec3a();
+        let (rotation, translation) = (rotation_of(pose), pose.translation.as_vec3a());
+        let is_identity = *pose == Pose::IDENTITY;
+        if (rotation, translation, is_identity) == (body.rotation, body.translation, body.is_identity) {
+            return Ok(());
+        }
+        (body.rotation, body.translation, body.is_identity) = (rotation, translation, is_identity);
+        body.inverse_rotation = rotation.transpose();
+        self.changes += 1;
+        body.change = self.changes;
         self.stale = true;
         Ok(())
     }
@@ -302,6 +320,11 @@ impl Stage {
     #[inline]
     pub(crate) fn material_of(&self, body: usize) -> &Material {
         &self.bodies[body].material
+    }
+
+    /// For each body the number of its last change: different numbers, other places.
+    pub(crate) fn changes(&self) -> impl Iterator<Item = u64> {
+        self.bodies.iter().map(|b| b.change.max(self.shapes[b.shape].change))
     }
 
     /// All bodies as a camera sees them.

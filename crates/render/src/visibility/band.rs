@@ -1,9 +1,6 @@
 //! A band of rows of the picture: the clusters that it may show, and their triangles.
 
-use super::clusters::{Cluster, Clusters};
-use super::triangle::{Eight, One};
-use super::visibility::View;
-use super::{LANES, Vec8, gathered, splat};
+use crate::raster::{Cluster, Clusters, Eight, LANES, One, Vec8, View, gathered, splat};
 use crate::rays::TILE;
 use crate::stage::{BodyView, Stage};
 use fearless_simd::{
@@ -58,11 +55,11 @@ impl<'a> Band<'a> {
         Self { view, first_row, rows, rays, each, depth, triangle, planes }
     }
 
-    /// Draws all bodies.
+    /// Draws the bodies that `drawn` says.
     #[inline(always)]
-    pub fn draw<S: Simd>(&mut self, simd: S, stage: &Stage) {
+    pub fn draw<S: Simd>(&mut self, simd: S, stage: &Stage, drawn: &impl Fn(usize) -> bool) {
         let mut corners = Corners { place: [[0.0; 4]; PLACES], image: [[0.0; 4]; PLACES] };
-        for body in stage.bodies_seen_from(self.view) {
+        for (_, body) in stage.bodies_seen_from(self.view).enumerate().filter(|(k, _)| drawn(*k)) {
             let clusters = body.clusters;
             let culled = clusters.fixed.closed && !body.holds_eye();
             let spheres = &*clusters.spheres;
@@ -289,9 +286,9 @@ impl<'a> Band<'a> {
                 let lane = met.trailing_zeros() as usize & (LANES - 1);
                 met &= met - 1;
                 let at = places[lane];
-                if t[lane] < self.depth[at] {
-                    self.depth[at] = t[lane];
-                    self.triangle[at] = first + numbers[lane];
+                let number = first + numbers[lane];
+                if (t[lane], number) < (self.depth[at], self.triangle[at]) {
+                    (self.depth[at], self.triangle[at]) = (t[lane], number);
                 }
             }
         }
