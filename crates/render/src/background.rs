@@ -144,6 +144,11 @@ impl Background {
         self.visibility.as_ref()
     }
 
+    /// The bodies at rest, to be lit.
+    pub fn visibility_mut(&mut self) -> Option<&mut Visibility> {
+        self.visibility.as_mut()
+    }
+
     /// Whether [`Self::keep_light`] is worth while: the picture before had this look too.
     pub fn wants_light(&mut self, lights: &[Light], environment: [f32; 3], film: Film) -> bool {
         let same = |l: &Look| l.lights == lights && l.environment == environment && l.film == film;

@@ -1,11 +1,11 @@
 //! Direct light on what was rasterised: eight pixels of a body at a time.
 
+use crate::background::Behind;
 use crate::bvh::Stacks;
 use crate::direct::{BESIDE_EYE_SHARE, SHADOW_RAY_END};
 use crate::material::only;
-use crate::background::Behind;
 use crate::picture::Rows;
-use crate::raster::{LANES, NOTHING, Vec8, View, Visibility, dot, splat};
+use crate::raster::{LANES, NOTHING, Seen, Vec8, View, dot, splat};
 use crate::rays::TILE;
 use crate::shading_frame::offset;
 use crate::stage::{BundleCandidates, Stage, Surfaces, turned};
@@ -32,11 +32,21 @@ struct Waiting {
     light: Vec3A,
 }
 
+/// Eight pixels of a row.
+#[derive(Clone, Copy)]
+struct Part {
+    /// Place of the first in the rows that are seen.
+    at: usize,
+    /// Place of its ray.
+    ray: usize,
+    /// Place of its colour.
+    to: usize,
+}
+
 /// A picture that is being shaded.
 pub(crate) struct Shading<'a> {
     pub stage: &'a Stage,
     pub view: &'a View<'a>,
-    pub visibility: &'a Visibility,
     pub shadows: bool,
     /// What the rows hold already.
     pub behind: Option<Behind<'a>>,
@@ -54,31 +64,29 @@ impl Buffers {
     }
 }
 
+/// Whether a lamp of the stage may cast a shadow that an eye at `eye` sees on what is at least `least`
+/// away from it (m).
+pub(crate) fn may_cast(stage: &Stage, eye: Vec3A, least: f32) -> bool {
+    stage.lamps().iter().any(|lamp| {
+        let apart = lamp.centre().distance(eye);
+        apart.is_nan() || apart >= BESIDE_EYE_SHARE * (least - apart).max(0.0)
+    })
+}
+
 impl<'a> Shading<'a> {
     /// Of all pixels, without shadows.
-    pub fn new(stage: &'a Stage, view: &'a View<'a>, visibility: &'a Visibility) -> Self {
-        Self { stage, view, visibility, shadows: false, behind: None }
-    }
-
-    /// Whether a lamp may cast a shadow that the eye sees.
-    pub fn may_cast(&self) -> bool {
-        let eye = self.view.origin;
-        let least = self.visibility.depth.iter().copied().fold(f32::INFINITY, f32::min);
-        // Rays are at least as long as their parameter says.
-        self.stage.lamps().iter().any(|lamp| {
-            let apart = lamp.centre().distance(eye);
-            apart.is_nan() || apart >= BESIDE_EYE_SHARE * (least - apart).max(0.0)
-        })
+    pub fn new(stage: &'a Stage, view: &'a View<'a>) -> Self {
+        Self { stage, view, shadows: false, behind: None }
     }
 
     /// Shades the rows of a picture from row `first`.
-    pub fn shade(&self, first: usize, rows: &mut Rows<'_>, buffers: &mut Buffers) {
-        dispatch!(self.stage.level, simd => self.shade_in(simd, first, rows, buffers));
+    pub fn shade(&self, first: usize, seen: &Seen<'_>, rows: &mut Rows<'_>, buffers: &mut Buffers) {
+        dispatch!(self.stage.level, simd => self.shade_in(simd, first, seen, rows, buffers));
     }
 
     #[inline(always)]
-    fn shade_in<S: Simd>(&self, simd: S, first: usize, rows: &mut Rows<'_>, buffers: &mut Buffers) {
-        let width = self.view.rays.width();
+    fn shade_in<S: Simd>(&self, simd: S, first: usize, seen: &Seen<'_>, rows: &mut Rows<'_>, buffers: &mut Buffers) {
+        let (width, stride) = (self.view.rays.width(), self.view.rays.stride());
         buffers.waiting.resize_with(self.stage.lamps().len(), Vec::new);
         let count = rows.depth.len() / width;
         let parts = width.div_ceil(LANES);
@@ -91,10 +99,12 @@ impl<'a> Shading<'a> {
             while left < width {
                 let mut row = top;
                 while row < count.min(top + TILE) {
-                    let fresh = self.fresh(simd, [left, first + row]);
+                    let part =
+                        Part { at: row * stride + left, ray: (first + row) * stride + left, to: row * width + left };
+                    let fresh = self.fresh(simd, part, LANES.min(width - left), seen);
                     if fresh != 0 {
                         buffers.shaded[row * parts + left / LANES] = true;
-                        self.pixels(simd, fresh, [left, first + row], row * width + left, rows, &mut body, buffers);
+                        self.pixels(simd, fresh, part, seen, rows, &mut body, buffers);
                     }
                     row += 1;
                 }
@@ -107,33 +117,31 @@ impl<'a> Shading<'a> {
         }
     }
 
-    /// Which of eight pixels of a row from pixel `u`, `v` are not as those behind.
+    /// Which of the first `count` pixels of a part are not as those behind.
     #[inline(always)]
-    fn fresh<S: Simd>(&self, simd: S, [u, v]: [usize; 2]) -> u64 {
-        let at = v * self.view.rays.stride() + u;
-        let within = (1 << LANES.min(self.view.rays.width() - u)) - 1;
+    fn fresh<S: Simd>(&self, simd: S, Part { at, ray, .. }: Part, count: usize, seen: &Seen<'_>) -> u64 {
+        let within = (1 << count) - 1;
         let Some(Behind { visibility: behind, .. }) = self.behind else { return within };
-        let now = u32x8::from_slice(simd, &self.visibility.triangle[at..at + LANES]);
-        let before = u32x8::from_slice(simd, &behind.triangle[at..at + LANES]);
+        let now = u32x8::from_slice(simd, &seen.triangle[at..at + LANES]);
+        let before = u32x8::from_slice(simd, &behind.triangle[ray..ray + LANES]);
         !now.simd_eq(before).to_bitmask() & within
     }
 
-    /// Shades the pixels `fresh` of eight in a row from pixel `u`, `v`; `to` is their place in `rows`.
+    /// Shades the pixels `fresh` of a part.
     #[allow(clippy::too_many_arguments, reason = "one call")]
     #[inline(always)]
     fn pixels<S: Simd>(
         &self,
         simd: S,
         fresh: u64,
-        [u, v]: [usize; 2],
-        to: usize,
+        Part { at, ray: from, to }: Part,
+        seen: &Seen<'_>,
         rows: &mut Rows<'_>,
         body: &mut (usize, Range<u32>),
         buffers: &mut Buffers,
     ) {
-        let Self { stage, view, visibility, .. } = self;
-        let at = v * view.rays.stride() + u;
-        let numbers = &visibility.triangle[at..at + LANES];
+        let Self { stage, view, .. } = self;
+        let numbers = &seen.triangle[at..at + LANES];
         let [x, y, z] = view.rays.axes();
         let mut bodies = [0; LANES];
         let mut open = 0_u64;
@@ -151,17 +159,17 @@ impl<'a> Shading<'a> {
             }
             (rows.depth[to + lane], rows.labels[to + lane]) = (0.0, 0);
             rows.normals[to + lane] = [0.0; 3];
-            rows.light[to + lane] = if x[at + lane].is_nan() { [0.0; 3] } else { stage.environment };
+            rows.light[to + lane] = if x[from + lane].is_nan() { [0.0; 3] } else { stage.environment };
         }
         if open == 0 {
             return;
         }
         let ray = [
-            f32x8::from_slice(simd, &x[at..at + LANES]),
-            f32x8::from_slice(simd, &y[at..at + LANES]),
-            f32x8::from_slice(simd, &z[at..at + LANES]),
+            f32x8::from_slice(simd, &x[from..from + LANES]),
+            f32x8::from_slice(simd, &y[from..from + LANES]),
+            f32x8::from_slice(simd, &z[from..from + LANES]),
         ];
-        let t = f32x8::from_slice(simd, &visibility.depth[at..at + LANES]);
+        let t = f32x8::from_slice(simd, &seen.depth[at..at + LANES]);
         let depth: [f32; LANES] = (t * ray[2]).max(splat(simd, 0.0)).into();
         let to_camera = view.rotation.transpose();
         while open != 0 {

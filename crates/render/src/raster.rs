@@ -19,7 +19,7 @@ mod view;
 pub(crate) use clusters::{Cluster, Clusters};
 pub(crate) use projection::Projection;
 pub(crate) use triangle::{Eight, One, cross, dot, minus};
-pub(crate) use view::{NOTHING, View, Visibility};
+pub(crate) use view::{NOTHING, Seen, View, Visibility};
 
 use fearless_simd::{Simd, SimdBase, SimdCombine, f32x4, f32x8};
 

@@ -264,6 +264,12 @@ impl Stage {
         self.bodies.iter().map(|b| self.shapes[b.shape].triangles.len()).sum()
     }
 
+    /// Frees what is kept of earlier previews, see [`crate::render_into`]. The next ones are made from
+    /// nothing and are the same.
+    pub fn forget_pictures(&mut self) {
+        self.memory = Memory::default();
+    }
+
     /// Updates the lamps.
     pub(crate) fn update_lamps(&mut self) {
         self.lamps.clear();
