@@ -3,9 +3,10 @@
 use crate::background::Behind;
 use crate::bvh::Stacks;
 use crate::direct::{BESIDE_EYE_SHARE, SHADOW_RAY_END};
+use crate::lanes::{LANES, Vec8, dot, splat};
 use crate::material::only;
 use crate::picture::Rows;
-use crate::raster::{LANES, NOTHING, Seen, Vec8, View, dot, splat};
+use crate::raster::{NOTHING, Seen, View};
 use crate::rays::TILE;
 use crate::shading_frame::offset;
 use crate::stage::{BundleCandidates, Stage, Surfaces, turned};

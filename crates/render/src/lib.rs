@@ -41,6 +41,7 @@ mod deferred;
 mod direct;
 mod error;
 mod film;
+mod lanes;
 mod light;
 mod material;
 mod microfacet;

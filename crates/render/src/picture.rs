@@ -1,7 +1,7 @@
 //! Rendered pictures: colour, depth, labels and normals.
 
 use crate::film::Film;
-use crate::raster::LANES;
+use crate::lanes::LANES;
 use crate::rays::RayGenerator;
 use rayon::prelude::*;
 use trocar_camera::{ColorImage, DepthImage};

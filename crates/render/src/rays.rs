@@ -1,6 +1,10 @@
 //! Precomputed rays of a camera's pixels. The lens model costs nothing at render time.
 
-use crate::raster::{LANES, Projection};
+mod projection;
+
+pub(crate) use projection::Projection;
+
+use crate::lanes::LANES;
 use glam::Vec3A;
 use rayon::prelude::*;
 use std::sync::OnceLock;

@@ -3,6 +3,7 @@
 mod model;
 mod queries;
 mod surface;
+mod vertex;
 
 pub use model::{BodyId, ShapeId, Stage};
 pub(crate) use model::{BodyView, StageHit, rotation_of};

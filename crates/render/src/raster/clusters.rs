@@ -1,7 +1,7 @@
 //! Clusters of neighbouring triangles of a shape, with their vertices in order.
 
-use super::LANES;
 use crate::bvh::Bounds;
+use crate::lanes::LANES;
 use glam::{DVec3, Vec3A};
 use std::sync::Arc;
 use trocar_geometry::TriMesh;

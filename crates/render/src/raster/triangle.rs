@@ -1,6 +1,6 @@
 //! A triangle seen from the eye: the test of eight pixels.
 
-use super::{Vec8, splat};
+use crate::lanes::{Vec8, cross, dot, minus, splat};
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x8, u32x8};
 
 /// Eight triangles as seen from the eye, in the camera frame.
@@ -155,21 +155,4 @@ impl<S: Simd> One<S> {
 #[inline(always)]
 fn times<S: Simd>(a: Vec8<S>, b: f32x8<S>) -> Vec8<S> {
     [a[0] * b, a[1] * b, a[2] * b]
-}
-
-#[inline(always)]
-pub(crate) fn minus<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-pub(crate) fn dot<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> f32x8<S> {
-    (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
-}
-
-/// The cross product. Exchanging the arguments changes its sign and no other bit, so that an edge
-/// is the same for both of its triangles.
-#[inline(always)]
-pub(crate) fn cross<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

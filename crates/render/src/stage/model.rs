@@ -1,11 +1,12 @@
 //! A stage: shapes, some of which deform, and the bodies that show them at a pose.
 
-use super::surface::{Vertex, vector};
+use super::vertex::{Vertex, vector};
 use crate::background::Memory;
 use crate::bvh::{Bounds, BoxTree, Ray, TriangleTree};
+use crate::lanes::Vec8;
 use crate::light::{Lamp, Light};
 use crate::material::{Appearance, Material};
-use crate::raster::{Clusters, Vec8, View};
+use crate::raster::{Clusters, View};
 use crate::{Error, Result, srgb};
 use fearless_simd::{Level, Simd};
 use glam::{DVec3, Mat3A, Quat, Vec3A};

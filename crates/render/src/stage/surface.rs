@@ -1,7 +1,9 @@
 //! Points on the surfaces of bodies: where rays meet them, one at a time or eight.
 
 use super::model::{Shape, Stage, StageHit};
-use crate::raster::{LANES, Vec8, View, cross, dot, gathered, minus, splat};
+use super::vertex::vector;
+use crate::lanes::{LANES, Vec8, cross, dot, gathered, minus, splat};
+use crate::raster::View;
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, f32x8};
 use glam::{Mat3A, Vec3A};
 
@@ -30,15 +32,6 @@ macro_rules! gather {
             ],
         )
     };
-}
-
-/// A vertex of a shape. What a pixel needs of it lies together.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Vertex {
-    pub position: [f32; 4],
-    pub normal: [f32; 4],
-    /// Linear colour.
-    pub color: [f32; 4],
 }
 
 /// A surface point, in the world frame.
@@ -190,9 +183,4 @@ fn unit<S: Simd>(simd: S, v: Vec8<S>) -> Vec8<S> {
 #[inline(always)]
 fn all<S: Simd>(simd: S, v: Vec3A) -> Vec8<S> {
     [splat(simd, v.x), splat(simd, v.y), splat(simd, v.z)]
-}
-
-#[inline(always)]
-pub(super) fn vector([x, y, z, _]: &[f32; 4]) -> Vec3A {
-    Vec3A::new(*x, *y, *z)
 }

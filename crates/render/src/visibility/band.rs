@@ -1,6 +1,7 @@
 //! A band of rows of the picture: the clusters that it may show, and their triangles.
 
-use crate::raster::{Cluster, Clusters, Eight, LANES, One, Vec8, View, gathered, splat};
+use crate::lanes::{LANES, Vec8, gathered, splat};
+use crate::raster::{Cluster, Clusters, Eight, One, View};
 use crate::rays::TILE;
 use crate::stage::{BodyView, Stage};
 use fearless_simd::{
