@@ -13,8 +13,9 @@ use trocar_camera::CameraModel;
 /// Number of cameras, each at one pose, of which a background is kept.
 const CAMERAS: usize = 4;
 
-/// A body is at rest after so many pictures through a camera in which it has not moved. Bodies that
-/// have not moved between the first two are too.
+/// A body is at rest after so many pictures through a camera in which it has not moved, twice as many
+/// whenever it has moved after a rest. Bodies that have not moved between the first two pictures are
+/// at rest too.
 const REST: u32 = 30;
 
 /// Memory for previews of a stage.
@@ -48,6 +49,8 @@ struct Rest {
     change: u64,
     /// Pictures since then.
     pictures: u32,
+    /// Pictures after which it is at rest.
+    needed: u32,
     is_drawn: bool,
 }
 
@@ -100,7 +103,7 @@ impl Background {
             lens: view.rays.lens(),
             rotation: view.rotation,
             origin: view.origin,
-            bodies: changes.map(|change| Rest { change, pictures: REST - 1, is_drawn: false }).collect(),
+            bodies: changes.map(|change| Rest { change, pictures: REST - 1, needed: REST, is_drawn: false }).collect(),
             visibility: None,
             look: None,
             picture: None,
@@ -115,8 +118,11 @@ impl Background {
     fn follow(&mut self, changes: impl Iterator<Item = u64>) {
         for (k, change) in changes.enumerate() {
             match self.bodies.get_mut(k) {
-                None => self.bodies.push(Rest { change, pictures: 0, is_drawn: false }),
-                Some(body) if body.change != change => *body = Rest { change, pictures: 0, ..*body },
+                None => self.bodies.push(Rest { change, pictures: 0, needed: REST, is_drawn: false }),
+                Some(body) if body.change != change => {
+                    let needed = body.needed.saturating_mul(if body.rests() { 2 } else { 1 });
+                    *body = Rest { change, pictures: 0, needed, ..*body };
+                }
                 Some(body) => body.pictures = body.pictures.saturating_add(1),
             }
         }
@@ -173,6 +179,6 @@ impl Background {
 
 impl Rest {
     fn rests(&self) -> bool {
-        self.pictures >= REST
+        self.pictures >= self.needed
     }
 }
