@@ -16,7 +16,7 @@ const CAMERAS: usize = 4;
 /// A body is at rest after so many pictures through a camera in which it has not moved, twice as many
 /// whenever it has moved after a rest. Bodies that have not moved between the first two pictures are
 /// at rest too.
-const REST: u32 = 30;
+const REST: u32 = 8;
 
 /// Memory for previews of a stage.
 #[derive(Debug, Default)]
@@ -138,11 +138,21 @@ impl Background {
         self.bodies.get(body).is_some_and(Rest::rests)
     }
 
-    /// Keeps the bodies at rest, drawn.
-    pub fn keep(&mut self, drawn: Visibility) {
+    /// Whether a body is drawn.
+    pub fn shows(&self, body: usize) -> bool {
+        self.bodies.get(body).is_some_and(|b| b.is_drawn)
+    }
+
+    /// Whether all bodies that are drawn are at rest.
+    pub fn is_right(&self) -> bool {
+        self.bodies.iter().all(|b| b.rests() || !b.is_drawn)
+    }
+
+    /// Keeps the bodies at rest, drawn. Returns what was kept before, if it was lit.
+    pub fn keep(&mut self, drawn: Visibility) -> Option<(Visibility, Picture)> {
         self.bodies.iter_mut().for_each(|b| b.is_drawn = b.rests());
-        self.visibility = self.bodies.iter().any(|b| b.is_drawn).then_some(drawn);
-        self.picture = None;
+        let kept = self.bodies.iter().any(|b| b.is_drawn).then_some(drawn);
+        std::mem::replace(&mut self.visibility, kept).zip(self.picture.take())
     }
 
     /// The bodies at rest.

@@ -44,18 +44,23 @@ pub(crate) fn preview(picture: &mut Picture, stage: &mut Stage, view: &View<'_>,
     stage.memory = memory;
 }
 
-/// Draws and lights the bodies at rest, if others are than before.
+/// Draws and lights the bodies at rest, if others are than before. What has come to rest is drawn
+/// before what is kept. Only pixels that show another triangle are lit.
 fn keep(background: &mut Background, stage: &Stage, view: &View<'_>, film: &Film) {
+    let mut before = None;
     if background.is_stale() {
-        let mut drawn = Visibility::default();
-        draw(&mut drawn, &Drawing { stage, view, drawn: &|body| background.rests(body), behind: None });
-        background.keep(drawn);
+        let behind = background.visibility().filter(|_| background.is_right());
+        let drawn = |body| background.rests(body) && !(behind.is_some() && background.shows(body));
+        let mut fresh = Visibility::default();
+        draw(&mut fresh, &Drawing { stage, view, drawn: &drawn, behind });
+        before = background.keep(fresh);
     }
     // Noise differs from picture to picture.
     let clean = Film { noise: None, ..*film };
     if background.wants_light(&stage.lights, stage.environment, clean) {
         let mut lit = Picture::new(view.rays.width(), view.rays.height());
-        let shading = Shading::new(stage, view);
+        let behind = before.as_ref().map(|(visibility, picture)| Behind { visibility, picture });
+        let shading = Shading { behind, ..Shading::new(stage, view) };
         if let Some(visibility) = background.visibility_mut() {
             let bands = lit.bands(view.rays.width() * ROWS).zip(visibility.bands(view.rays, ROWS));
             bands.for_each_init(Buffers::new, |buffers, ((k, rows), seen)| {
