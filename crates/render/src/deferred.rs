@@ -1,15 +1,18 @@
 //! Direct light on what was rasterised: eight pixels of a body at a time.
 
+use crate::background::Behind;
 use crate::bvh::Stacks;
 use crate::direct::{BESIDE_EYE_SHARE, SHADOW_RAY_END};
+use crate::lanes::{LANES, Vec8, dot, splat};
 use crate::material::only;
 use crate::picture::Rows;
-use crate::raster::{LANES, NOTHING, Vec8, View, Visibility, dot, splat};
+use crate::raster::{NOTHING, Seen, View};
 use crate::rays::TILE;
 use crate::shading_frame::offset;
-use crate::stage::{BundleCandidates, Stage};
-use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x8};
+use crate::stage::{BundleCandidates, Stage, Surfaces, turned};
+use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x8, u32x8};
 use glam::Vec3A;
+use std::ops::Range;
 
 /// Buffers that a thread reuses from band to band.
 pub(crate) struct Buffers {
@@ -18,6 +21,8 @@ pub(crate) struct Buffers {
     directions: Vec<Vec3A>,
     candidates: BundleCandidates,
     stacks: Stacks,
+    /// Which parts of [`LANES`] pixels of the rows are not as those behind.
+    pub shaded: Vec<bool>,
 }
 
 /// A pixel of a band and the light that a lamp may add to it.
@@ -28,23 +33,24 @@ struct Waiting {
     light: Vec3A,
 }
 
-/// Surface points of eight pixels, by axis.
-#[derive(Default)]
-struct Points {
-    position: [[f32; LANES]; 3],
-    normal: [[f32; LANES]; 3],
-    albedo: [[f32; LANES]; 3],
-    to_eye: [[f32; LANES]; 3],
-    flat: [Vec3A; LANES],
-    body: [u32; LANES],
+/// Eight pixels of a row.
+#[derive(Clone, Copy)]
+struct Part {
+    /// Place of the first in the rows that are seen.
+    at: usize,
+    /// Place of its ray.
+    ray: usize,
+    /// Place of its colour.
+    to: usize,
 }
 
 /// A picture that is being shaded.
 pub(crate) struct Shading<'a> {
     pub stage: &'a Stage,
     pub view: &'a View<'a>,
-    pub visibility: &'a Visibility,
     pub shadows: bool,
+    /// What the rows hold already.
+    pub behind: Option<Behind<'a>>,
 }
 
 impl Buffers {
@@ -54,41 +60,53 @@ impl Buffers {
             directions: Vec::new(),
             candidates: BundleCandidates::default(),
             stacks: Stacks::new(),
+            shaded: Vec::new(),
         }
     }
 }
 
-impl Shading<'_> {
-    /// Whether a lamp may cast a shadow that the eye sees.
-    pub fn may_cast(&self) -> bool {
-        let eye = self.view.origin;
-        let least = self.visibility.depth.iter().copied().fold(f32::INFINITY, f32::min);
-        // Rays are at least as long as their parameter says.
-        self.stage.lamps().iter().any(|lamp| {
-            let apart = lamp.centre().distance(eye);
-            apart.is_nan() || apart >= BESIDE_EYE_SHARE * (least - apart).max(0.0)
-        })
+/// Whether a lamp of the stage may cast a shadow that an eye at `eye` sees on what is at least `least`
+/// away from it (m).
+pub(crate) fn may_cast(stage: &Stage, eye: Vec3A, least: f32) -> bool {
+    stage.lamps().iter().any(|lamp| {
+        let apart = lamp.centre().distance(eye);
+        apart.is_nan() || apart >= BESIDE_EYE_SHARE * (least - apart).max(0.0)
+    })
+}
+
+impl<'a> Shading<'a> {
+    /// Of all pixels, without shadows.
+    pub fn new(stage: &'a Stage, view: &'a View<'a>) -> Self {
+        Self { stage, view, shadows: false, behind: None }
     }
 
     /// Shades the rows of a picture from row `first`.
-    pub fn shade(&self, first: usize, rows: &mut Rows<'_>, buffers: &mut Buffers) {
-        dispatch!(self.stage.level, simd => self.shade_in(simd, first, rows, buffers));
+    pub fn shade(&self, first: usize, seen: &Seen<'_>, rows: &mut Rows<'_>, buffers: &mut Buffers) {
+        dispatch!(self.stage.level, simd => self.shade_in(simd, first, seen, rows, buffers));
     }
 
     #[inline(always)]
-    fn shade_in<S: Simd>(&self, simd: S, first: usize, rows: &mut Rows<'_>, buffers: &mut Buffers) {
-        let width = self.view.rays.width();
+    fn shade_in<S: Simd>(&self, simd: S, first: usize, seen: &Seen<'_>, rows: &mut Rows<'_>, buffers: &mut Buffers) {
+        let (width, stride) = (self.view.rays.width(), self.view.rays.stride());
         buffers.waiting.resize_with(self.stage.lamps().len(), Vec::new);
         let count = rows.depth.len() / width;
-        let mut points = Points::default();
-        let mut body = 0;
+        let parts = width.div_ceil(LANES);
+        buffers.shaded.clear();
+        buffers.shaded.resize(count * parts, false);
+        let mut body = (0, 0..0);
         let mut top = 0;
         while top < count {
             let mut left = 0;
             while left < width {
                 let mut row = top;
                 while row < count.min(top + TILE) {
-                    self.pixels(simd, [left, first + row], row * width + left, rows, &mut points, &mut body, buffers);
+                    let part =
+                        Part { at: row * stride + left, ray: (first + row) * stride + left, to: row * width + left };
+                    let fresh = self.fresh(simd, part, LANES.min(width - left), seen);
+                    if fresh != 0 {
+                        buffers.shaded[row * parts + left / LANES] = true;
+                        self.pixels(simd, fresh, part, seen, rows, &mut body, buffers);
+                    }
                     row += 1;
                 }
                 if self.shadows {
@@ -100,65 +118,80 @@ impl Shading<'_> {
         }
     }
 
-    /// Shades up to eight pixels of a row from pixel `u`, `v`; `to` is their place in `rows`.
+    /// Which of the first `count` pixels of a part are not as those behind.
+    #[inline(always)]
+    fn fresh<S: Simd>(&self, simd: S, Part { at, ray, .. }: Part, count: usize, seen: &Seen<'_>) -> u64 {
+        let within = (1 << count) - 1;
+        let Some(Behind { visibility: behind, .. }) = self.behind else { return within };
+        let now = u32x8::from_slice(simd, &seen.triangle[at..at + LANES]);
+        let before = u32x8::from_slice(simd, &behind.triangle[ray..ray + LANES]);
+        !now.simd_eq(before).to_bitmask() & within
+    }
+
+    /// Shades the pixels `fresh` of a part.
     #[allow(clippy::too_many_arguments, reason = "one call")]
     #[inline(always)]
     fn pixels<S: Simd>(
         &self,
         simd: S,
-        [u, v]: [usize; 2],
-        to: usize,
+        fresh: u64,
+        Part { at, ray: from, to }: Part,
+        seen: &Seen<'_>,
         rows: &mut Rows<'_>,
-        points: &mut Points,
-        body: &mut usize,
+        body: &mut (usize, Range<u32>),
         buffers: &mut Buffers,
     ) {
-        let Self { stage, view, visibility, .. } = self;
-        let at = v * view.rays.stride() + u;
-        let count = LANES.min(view.rays.width() - u);
-        let to_camera = view.rotation.transpose();
+        let Self { stage, view, .. } = self;
+        let numbers = &seen.triangle[at..at + LANES];
+        let [x, y, z] = view.rays.axes();
+        let mut bodies = [0; LANES];
         let mut open = 0_u64;
-        for lane in 0..count {
-            let number = visibility.triangle[at + lane];
-            if number == NOTHING {
-                (rows.depth[to + lane], rows.labels[to + lane]) = (0.0, 0);
-                rows.normals[to + lane] = [0.0; 3];
-                let seen = view.rays.through(u + lane, v).x == view.rays.through(u + lane, v).x;
-                rows.light[to + lane] = if seen { stage.environment } else { [0.0; 3] };
+        for lane in 0..LANES {
+            if fresh >> lane & 1 == 0 {
                 continue;
             }
-            *body = stage.body_of(number, *body);
-            let ray = view.rays.through(u + lane, v);
-            let direction = view.rotation * ray;
-            let t = visibility.depth[at + lane];
-            let surface = stage.surface_along(*body, number, view.origin, direction, t);
-            let to_eye = -direction.normalize();
-            for k in 0..3 {
-                points.position[k][lane] = surface.position[k];
-                points.normal[k][lane] = surface.smooth[k];
-                points.albedo[k][lane] = surface.albedo[k];
-                points.to_eye[k][lane] = to_eye[k];
+            if numbers[lane] != NOTHING {
+                if !body.1.contains(&numbers[lane]) {
+                    *body = stage.body_of(numbers[lane]);
+                }
+                bodies[lane] = body.0;
+                open |= 1 << lane;
+                continue;
             }
-            points.flat[lane] = surface.flat;
-            points.body[lane] = *body as u32;
-            rows.depth[to + lane] = (t * ray.z).max(0.0);
-            rows.labels[to + lane] = stage.label_of(*body);
-            rows.normals[to + lane] = (to_camera * surface.smooth).to_array();
-            open |= 1 << lane;
+            (rows.depth[to + lane], rows.labels[to + lane]) = (0.0, 0);
+            rows.normals[to + lane] = [0.0; 3];
+            rows.light[to + lane] = if x[from + lane].is_nan() { [0.0; 3] } else { stage.environment };
         }
+        if open == 0 {
+            return;
+        }
+        let ray = [
+            f32x8::from_slice(simd, &x[from..from + LANES]),
+            f32x8::from_slice(simd, &y[from..from + LANES]),
+            f32x8::from_slice(simd, &z[from..from + LANES]),
+        ];
+        let t = f32x8::from_slice(simd, &seen.depth[at..at + LANES]);
+        let depth: [f32; LANES] = (t * ray[2]).max(splat(simd, 0.0)).into();
+        let to_camera = view.rotation.transpose();
         while open != 0 {
-            let first = points.body[open.trailing_zeros() as usize & (LANES - 1)];
+            let body = bodies[open.trailing_zeros() as usize & (LANES - 1)];
             let mut group = 0;
             for lane in 0..LANES {
-                group |= u64::from(points.body[lane] == first) << lane;
+                group |= u64::from(bodies[lane] == body) << lane;
             }
             group &= open;
             open &= !group;
-            let light = self.light(simd, first as usize, group, to, points, buffers);
-            for lane in 0..LANES {
-                if group >> lane & 1 == 1 {
-                    rows.light[to + lane] = [light[0][lane], light[1][lane], light[2][lane]];
-                }
+            let surfaces = stage.surfaces(simd, body, numbers, group, view, &ray, t);
+            let [x, y, z] = self.light(simd, body, group, to, &surfaces, buffers);
+            let normal = turned(&to_camera, &surfaces.smooth);
+            let [a, b, c]: [[f32; LANES]; 3] = [normal[0].into(), normal[1].into(), normal[2].into()];
+            let label = stage.label_of(body);
+            while group != 0 {
+                let lane = group.trailing_zeros() as usize & (LANES - 1);
+                group &= group - 1;
+                rows.light[to + lane] = [x[lane], y[lane], z[lane]];
+                rows.normals[to + lane] = [a[lane], b[lane], c[lane]];
+                (rows.depth[to + lane], rows.labels[to + lane]) = (depth[lane], label);
             }
         }
     }
@@ -172,26 +205,23 @@ impl Shading<'_> {
         body: usize,
         group: u64,
         to: usize,
-        points: &Points,
+        points: &Surfaces<S>,
         buffers: &mut Buffers,
     ) -> [[f32; LANES]; 3] {
         let material = self.stage.material_of(body);
-        let position = load(simd, &points.position);
-        let normal = load(simd, &points.normal);
-        let albedo = load(simd, &points.albedo);
-        let to_eye = load(simd, &points.to_eye);
+        let Surfaces { position, smooth: normal, albedo, to_eye, .. } = points;
         let zero = splat(simd, 0.0);
         // Metal mirrors the room: approximately darker towards grazing angles, where it mirrors
         // what lies behind it.
-        let ambient = if material.is_metal() { dot(normal, to_eye) * 0.85 + 0.35 } else { splat(simd, 1.0) };
+        let ambient = if material.is_metal() { dot(*normal, *to_eye) * 0.85 + 0.35 } else { splat(simd, 1.0) };
         let environment = self.stage.environment;
         let mut sum = [zero; 3];
         for k in 0..3 {
             sum[k] = albedo[k] * ambient * environment[k];
         }
         for (number, lamp) in self.stage.lamps().iter().enumerate() {
-            let arriving = lamp.arriving_at(simd, &position);
-            let back = material.lit(simd, &albedo, &normal, &to_eye, &arriving.direction);
+            let arriving = lamp.arriving_at(simd, position);
+            let back = material.lit(simd, albedo, normal, to_eye, &arriving.direction);
             let mut added = [zero; 3];
             for k in 0..3 {
                 added[k] = back[k] * arriving.light[k];
@@ -202,17 +232,17 @@ impl Shading<'_> {
                 let beside = (apart * apart).simd_gt(splat(simd, lamp.centre().distance_squared(self.view.origin)));
                 let lit = (added[0] + added[1] + added[2]).simd_gt(zero);
                 let mut lanes = !beside.to_bitmask() & lit.to_bitmask() & group;
-                let values: [[f32; LANES]; 3] = [added[0].into(), added[1].into(), added[2].into()];
+                let values = lanes_of(&added);
+                let (positions, flats) = (lanes_of(position), lanes_of(&points.flat));
                 while lanes != 0 {
                     let lane = lanes.trailing_zeros() as usize & (LANES - 1);
                     lanes &= lanes - 1;
-                    let [x, y, z] = &points.position;
-                    let position = Vec3A::new(x[lane], y[lane], z[lane]);
-                    let flat = points.flat[lane];
+                    let position = one(&positions, lane);
+                    let flat = one(&flats, lane);
                     let direction = position + flat * offset(position) - lamp.centre();
                     // A surface that faces away from the lamp is in its own shadow.
                     if direction.dot(flat) < 0.0 {
-                        let light = Vec3A::new(values[0][lane], values[1][lane], values[2][lane]);
+                        let light = one(&values, lane);
                         buffers.waiting[number].push(Waiting { pixel: to + lane, direction, light });
                     }
                 }
@@ -228,7 +258,7 @@ impl Shading<'_> {
     /// Adds the waiting light of a tile where no surface blocks it. Rays start at the lamp, so
     /// those of a tile form a bundle.
     fn cast(&self, rows: &mut Rows<'_>, buffers: &mut Buffers) {
-        let Buffers { waiting, directions, candidates, stacks } = buffers;
+        let Buffers { waiting, directions, candidates, stacks, .. } = buffers;
         for (lamp, waiting) in self.stage.lamps().iter().zip(waiting) {
             if waiting.is_empty() {
                 continue;
@@ -248,6 +278,11 @@ impl Shading<'_> {
 }
 
 #[inline(always)]
-fn load<S: Simd>(simd: S, from: &[[f32; LANES]; 3]) -> Vec8<S> {
-    [f32x8::from_slice(simd, &from[0]), f32x8::from_slice(simd, &from[1]), f32x8::from_slice(simd, &from[2])]
+fn lanes_of<S: Simd>(v: &Vec8<S>) -> [[f32; LANES]; 3] {
+    [v[0].into(), v[1].into(), v[2].into()]
+}
+
+#[inline(always)]
+fn one(v: &[[f32; LANES]; 3], lane: usize) -> Vec3A {
+    Vec3A::new(v[0][lane], v[1][lane], v[2][lane])
 }

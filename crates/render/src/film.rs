@@ -31,6 +31,9 @@ pub struct Noise {
     pub frame: u32,
 }
 
+/// Pixels whose gain is computed together.
+const CHUNK: usize = 32;
+
 impl Default for Film {
     /// Exposure 1, no vignette, no highlight compression, no noise.
     fn default() -> Self {
@@ -44,15 +47,30 @@ impl Film {
         Self { exposure: 1.0, vignette: 0.45, shoulder: 0.7, noise: None }
     }
 
-    /// The sRGB colours of row `v` of a picture with linear radiance `light`.
-    pub(crate) fn develop(&self, rays: &RayGenerator, v: usize, light: &[[f32; 3]], colors: &mut [[u8; 3]]) {
+    /// The sRGB colours of pixels of a row, from pixel `first`, `v`, of a picture with linear radiance
+    /// `light`.
+    pub(crate) fn develop(
+        &self,
+        rays: &RayGenerator,
+        [first, v]: [usize; 2],
+        light: &[[f32; 3]],
+        colors: &mut [[u8; 3]],
+    ) {
         let encoder = Encoder::new();
         let knee = self.shoulder.clamp(0.0, 1.0);
+        let mut gains = [0.0; CHUNK];
         for (u, (color, light)) in colors.iter_mut().zip(light).enumerate() {
-            let gain = self.exposure * (1.0 - self.vignette * rays.eccentricity_squared(u, v)).max(0.0);
+            if u % CHUNK == 0 {
+                for (k, gain) in gains.iter_mut().enumerate() {
+                    *gain =
+                        self.exposure * (1.0 - self.vignette * rays.eccentricity_squared(first + u + k, v)).max(0.0);
+                }
+            }
+            let gain = gains[u % CHUNK];
             let mut values = [light[0] * gain, light[1] * gain, light[2] * gain];
             if let Some(noise) = self.noise {
-                let [a, b, c, d] = numbers([(v * rays.width() + u) as u32, noise.frame, 0x6e6f_6973, noise.seed]);
+                let [a, b, c, d] =
+                    numbers([(v * rays.width() + first + u) as u32, noise.frame, 0x6e6f_6973, noise.seed]);
                 let ([x, y], [z, _]) = (normal(a, b), normal(c, d));
                 for (value, n) in values.iter_mut().zip([x, y, z]) {
                     let variance = noise.read * noise.read + noise.shot * noise.shot * value.max(0.0);

@@ -35,28 +35,34 @@
 //! # Ok::<(), trocar_render::Error>(())
 //! ```
 
+mod background;
 mod bvh;
 mod deferred;
 mod direct;
 mod error;
 mod film;
+mod lanes;
 mod light;
 mod material;
 mod microfacet;
 mod path;
 pub mod phong;
 mod picture;
+mod preview;
 pub mod random;
 mod raster;
 mod rays;
+mod render;
 mod shading_frame;
 pub mod srgb;
 mod stage;
+mod visibility;
 
 pub use error::{Error, Result};
 pub use film::{Film, Noise};
 pub use light::Light;
 pub use material::{Appearance, SurfaceKind};
-pub use picture::{Picture, RenderSettings, render, render_into};
+pub use picture::Picture;
 pub use rays::RayGenerator;
+pub use render::{RenderSettings, render, render_into};
 pub use stage::{BodyId, RayHit, ShapeId, Stage};

@@ -1,46 +1,10 @@
-//! Rendering: colour, depth, labels and normals of a stage in one pass.
+//! Rendered pictures: colour, depth, labels and normals.
 
-use crate::bvh::Stacks;
-use crate::deferred::{self, Shading};
-use crate::direct::{self, ShadowBuffers, VisiblePoint};
 use crate::film::Film;
-use crate::path::{Key, LENS, radiance};
-use crate::raster::{BAND, View};
-use crate::rays::{RayGenerator, TILE};
-use crate::stage::{BundleCandidates, Stage, rotation_of};
-use glam::Vec3A;
+use crate::lanes::LANES;
+use crate::rays::RayGenerator;
 use rayon::prelude::*;
 use trocar_camera::{ColorImage, DepthImage};
-use trocar_core::Pose;
-
-/// Limit on the radiance of one path. Rare paths that meet a light in a mirror by chance give white
-/// dots in a picture of a hundred paths per pixel (firefly clamping). The light that is lost is
-/// beyond any film's range.
-const MAX_PATH_RADIANCE: f32 = 24.0;
-
-/// How light is computed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum RenderSettings {
-    /// Direct light at pixel centres, rasterised: for policies and live views.
-    Preview {
-        /// Casts hard shadows with a ray per light.
-        shadows: bool,
-    },
-    /// The same light on what a ray per pixel hits: the reference for `Preview`.
-    Traced {
-        /// Casts hard shadows with a ray per light.
-        shadows: bool,
-    },
-    /// Path tracing: for publication pictures.
-    Path {
-        /// Paths per pixel.
-        samples: u32,
-        /// Maximum number of bounces per path.
-        bounces: u32,
-        /// Seed of the noise.
-        seed: u32,
-    },
-}
 
 /// A rendered picture, rows from the top. Depth, labels and normals are taken at pixel centres.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,18 +30,6 @@ pub(crate) struct Rows<'a> {
     pub light: &'a mut [[f32; 3]],
 }
 
-impl RenderSettings {
-    /// Direct light with hard shadows.
-    pub fn preview() -> Self {
-        Self::Preview { shadows: true }
-    }
-
-    /// Path tracing with at most eight bounces.
-    pub fn path(samples: u32) -> Self {
-        Self::Path { samples, bounces: 8, seed: 0 }
-    }
-}
-
 impl Picture {
     /// A black picture in which no body is visible.
     pub fn new(width: usize, height: usize) -> Self {
@@ -86,7 +38,7 @@ impl Picture {
         picture
     }
 
-    fn resize(&mut self, width: usize, height: usize) {
+    pub(crate) fn resize(&mut self, width: usize, height: usize) {
         let count = width * height;
         (self.color.width, self.color.height) = (width, height);
         (self.depth.width, self.depth.height) = (width, height);
@@ -110,55 +62,9 @@ impl Default for Picture {
     }
 }
 
-/// Renders the stage through `rays` at `pose` (camera to world). The result is bit-identical for
-/// any number of threads and any instruction set.
-pub fn render(stage: &mut Stage, rays: &RayGenerator, pose: &Pose, settings: &RenderSettings, film: &Film) -> Picture {
-    let mut picture = Picture::default();
-    render_into(&mut picture, stage, rays, pose, settings, film);
-    picture
-}
-
-/// Like [`render`], but reuses `picture`, and the memory that the stage keeps for previews. Little
-/// memory is allocated if the size stays the same.
-pub fn render_into(
-    picture: &mut Picture,
-    stage: &mut Stage,
-    rays: &RayGenerator,
-    pose: &Pose,
-    settings: &RenderSettings,
-    film: &Film,
-) {
-    picture.resize(rays.width(), rays.height());
-    stage.update_lamps();
-    let view = View { rays, rotation: rotation_of(pose), origin: pose.translation.as_vec3a() };
-    let RenderSettings::Preview { shadows } = *settings else {
-        stage.update_acceleration();
-        let shot = Shot { stage, view, settings };
-        picture.bands(rays.width() * TILE).for_each_init(TileBuffers::new, |buffers, (k, mut rows)| {
-            for left in (0..rays.width()).step_by(TILE) {
-                shot.tile(k * TILE, left, &mut rows, buffers);
-            }
-            rows.develop(film, rays, k * TILE);
-        });
-        return;
-    };
-    let mut visibility = std::mem::take(&mut stage.visibility);
-    visibility.draw(stage, &view);
-    let shadows = shadows && Shading { stage, view: &view, visibility: &visibility, shadows }.may_cast();
-    if shadows {
-        stage.update_acceleration();
-    }
-    let shading = Shading { stage, view: &view, visibility: &visibility, shadows };
-    picture.bands(rays.width() * BAND).for_each_init(deferred::Buffers::new, |buffers, (k, mut rows)| {
-        shading.shade(k * BAND, &mut rows, buffers);
-        rows.develop(film, rays, k * BAND);
-    });
-    stage.visibility = visibility;
-}
-
 impl Picture {
     /// Parts of `pixels` pixels, numbered.
-    fn bands(&mut self, pixels: usize) -> impl IndexedParallelIterator<Item = (usize, Rows<'_>)> {
+    pub(crate) fn bands(&mut self, pixels: usize) -> impl IndexedParallelIterator<Item = (usize, Rows<'_>)> {
         let pixels = pixels.max(1);
         let parts = (
             self.color.pixels.par_chunks_mut(pixels),
@@ -173,103 +79,32 @@ impl Picture {
 }
 
 impl Rows<'_> {
+    /// Copies the rows of a picture from pixel `first`.
+    pub fn copy_from(&mut self, picture: &Picture, first: usize) {
+        let held = first..first + self.depth.len();
+        self.color.copy_from_slice(&picture.color.pixels[held.clone()]);
+        self.depth.copy_from_slice(&picture.depth.depth[held.clone()]);
+        self.labels.copy_from_slice(&picture.labels[held.clone()]);
+        self.normals.copy_from_slice(&picture.normals[held.clone()]);
+        self.light.copy_from_slice(&picture.light[held]);
+    }
+
     /// Turns light into colour. `first` is the first of these rows.
-    fn develop(&mut self, film: &Film, rays: &RayGenerator, first: usize) {
+    pub fn develop(&mut self, film: &Film, rays: &RayGenerator, first: usize) {
         let width = rays.width();
         for (row, (color, light)) in self.color.chunks_mut(width).zip(self.light.chunks(width)).enumerate() {
-            film.develop(rays, first + row, light, color);
+            film.develop(rays, [0, first + row], light, color);
         }
     }
-}
 
-struct Shot<'a> {
-    stage: &'a Stage,
-    view: View<'a>,
-    settings: &'a RenderSettings,
-}
-
-/// Buffers that a thread reuses from tile to tile.
-struct TileBuffers {
-    stacks: Stacks,
-    /// For each pixel of the tile with a ray: its index in the band, and its ray in the camera
-    /// frame.
-    rays: Vec<(usize, Vec3A)>,
-    directions: Vec<Vec3A>,
-    candidates: BundleCandidates,
-    /// Direct light only: the visible surface points, and their pixels in the band.
-    visible: Vec<VisiblePoint>,
-    pixel_indices: Vec<usize>,
-    shadow_buffers: ShadowBuffers,
-}
-
-impl TileBuffers {
-    fn new() -> Self {
-        Self {
-            stacks: Stacks::new(),
-            rays: Vec::new(),
-            directions: Vec::new(),
-            candidates: BundleCandidates::default(),
-            visible: Vec::new(),
-            pixel_indices: Vec::new(),
-            shadow_buffers: ShadowBuffers::default(),
-        }
-    }
-}
-
-impl Shot<'_> {
-    /// Renders the pixels of a tile whose first row is `first` and whose first column is `left`.
-    fn tile(&self, first: usize, left: usize, rows: &mut Rows<'_>, buffers: &mut TileBuffers) {
-        let Self { stage, view, settings } = self;
-        let width = view.rays.width();
-        let TileBuffers { stacks, rays, directions, candidates, visible, pixel_indices, shadow_buffers } = buffers;
-        rays.clear();
-        for row in 0..rows.depth.len() / width {
-            for u in left..width.min(left + TILE) {
-                let i = row * width + u;
-                (rows.depth[i], rows.labels[i]) = (0.0, 0);
-                (rows.normals[i], rows.light[i]) = ([0.0; 3], [0.0; 3]);
-                rays.extend(view.rays.centre(first * width + i).map(|ray| (i, ray)));
-            }
-        }
-        directions.clear();
-        directions.extend(rays.iter().map(|(_, ray)| view.rotation * *ray));
-        stage.collect_bundle(view.origin, directions, candidates);
-        visible.clear();
-        pixel_indices.clear();
-        let to_camera = view.rotation.transpose();
-        for ((i, ray), direction) in rays.iter().zip(directions.iter()) {
-            rows.light[*i] = stage.environment;
-            if let Some(hit) = stage.first_of_bundle(candidates, view.origin, *direction, stacks) {
-                let surface = stage.surface(&hit, *direction);
-                rows.depth[*i] = (hit.t * ray.z).max(0.0);
-                rows.labels[*i] = stage.label(&hit);
-                rows.normals[*i] = (to_camera * surface.smooth).to_array();
-                pixel_indices.push(*i);
-                visible.push(VisiblePoint::new(stage, hit, surface, *direction));
-            }
-        }
-        match **settings {
-            RenderSettings::Preview { shadows } | RenderSettings::Traced { shadows } => {
-                direct::light(stage, view.origin, visible, shadows, shadow_buffers, stacks);
-                for (i, visible) in pixel_indices.iter().zip(visible.iter()) {
-                    rows.light[*i] = visible.light.to_array();
-                }
-            }
-            RenderSettings::Path { samples, bounces, seed } => {
-                for (i, _) in rays.iter() {
-                    let pixel = first * width + i;
-                    let key = |sample| Key { seed, pixel: pixel as u32, sample };
-                    let mut sum = Vec3A::ZERO;
-                    for sample in 0..samples.max(1) {
-                        let key = key(sample);
-                        let [a, b, ..] = key.draw(0, LENS);
-                        if let Some(ray) = view.rays.at(pixel, a, b) {
-                            let light = radiance(stage, view.origin, view.rotation * ray, bounces, key, stacks);
-                            sum += light * (MAX_PATH_RADIANCE / light.max_element().max(MAX_PATH_RADIANCE));
-                        }
-                    }
-                    rows.light[*i] = (sum / samples.max(1) as f32).to_array();
-                }
+    /// Like [`Self::develop`], but only those parts of [`LANES`] pixels of a row that `parts` says.
+    pub fn develop_parts(&mut self, film: &Film, rays: &RayGenerator, first: usize, parts: &[bool]) {
+        let width = rays.width();
+        let rows = self.color.chunks_mut(width).zip(self.light.chunks(width));
+        for (row, ((color, light), parts)) in rows.zip(parts.chunks(width.div_ceil(LANES))).enumerate() {
+            let parts = color.chunks_mut(LANES).zip(light.chunks(LANES)).zip(parts).enumerate();
+            for (k, ((color, light), _)) in parts.filter(|(_, (_, is_in))| **is_in) {
+                film.develop(rays, [k * LANES, first + row], light, color);
             }
         }
     }

@@ -9,26 +9,12 @@
 //! nothing is clipped.
 //!
 //! No operation is fused and lanes never interact, so every instruction set gives the same bits. A
-//! pixel's triangles are tested in the same order in any band.
+//! pixel shows the nearest triangle in whatever order triangles are drawn.
 
-mod band;
 mod clusters;
-mod projection;
 mod triangle;
-mod visibility;
+mod view;
 
-pub(crate) use clusters::Clusters;
-pub(crate) use projection::Projection;
-pub(crate) use triangle::{cross, dot, minus};
-pub(crate) use visibility::{BAND, NOTHING, View, Visibility};
-
-/// Numbers of a register.
-pub(crate) const LANES: usize = 8;
-
-/// Eight vectors, by axis.
-pub(crate) type Vec8<S> = [fearless_simd::f32x8<S>; 3];
-
-#[inline(always)]
-pub(crate) fn splat<S: fearless_simd::Simd>(simd: S, value: f32) -> fearless_simd::f32x8<S> {
-    fearless_simd::SimdBase::splat(simd, value)
-}
+pub(crate) use clusters::{Cluster, Clusters};
+pub(crate) use triangle::{Eight, One};
+pub(crate) use view::{NOTHING, Seen, View, Visibility};

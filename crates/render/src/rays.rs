@@ -1,6 +1,10 @@
 //! Precomputed rays of a camera's pixels. The lens model costs nothing at render time.
 
-use crate::raster::{LANES, Projection};
+mod projection;
+
+pub(crate) use projection::Projection;
+
+use crate::lanes::LANES;
 use glam::Vec3A;
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -18,6 +22,8 @@ pub struct RayGenerator {
     /// Rays through pixel centres, by axis, in rows of `stride`; NaN where nothing is visible and
     /// beyond the picture. Rays of a pinhole have z = 1, rays of a fisheye have length 1.
     centres: [Vec<f32>; 3],
+    /// The same, one ray after the other; the last number is not used.
+    each: Vec<[f32; 4]>,
     stride: usize,
     /// Rays through pixel corners: one row and one column more than there are pixels. Only paths
     /// need them.
@@ -58,6 +64,7 @@ impl RayGenerator {
             height,
             model,
             centres,
+            each: Vec::new(),
             stride,
             corners: OnceLock::new(),
             circle: None,
@@ -65,7 +72,7 @@ impl RayGenerator {
             tiles: TileBounds::default(),
         };
         rays.projection = Projection::new(&rays.model, &rays);
-        rays.tiles = TileBounds::of(&rays);
+        rays.finish();
         rays
     }
 
@@ -81,8 +88,15 @@ impl RayGenerator {
                 self.centres.iter_mut().for_each(|axis| axis[at] = f32::NAN);
             }
         }
-        self.tiles = TileBounds::of(&self);
+        self.finish();
         self
+    }
+
+    /// Derives what follows from the rays.
+    fn finish(&mut self) {
+        let [x, y, z] = &self.centres;
+        self.each = x.iter().zip(y).zip(z).map(|((x, y), z)| [*x, *y, *z, 0.0]).collect();
+        self.tiles = TileBounds::of(self);
     }
 
     /// Width (px).
@@ -95,6 +109,11 @@ impl RayGenerator {
         self.height
     }
 
+    /// What the rays follow from: the camera model, and the radius of the circular image (px).
+    pub(crate) fn lens(&self) -> (CameraModel, Option<f32>) {
+        (self.model, self.circle)
+    }
+
     /// Numbers of a row of [`Self::axes`].
     pub(crate) fn stride(&self) -> usize {
         self.stride
@@ -104,6 +123,11 @@ impl RayGenerator {
     /// visible and beyond the picture.
     pub(crate) fn axes(&self) -> &[Vec<f32>; 3] {
         &self.centres
+    }
+
+    /// The rays of [`Self::axes`] one after the other; the last number is not used.
+    pub(crate) fn each(&self) -> &[[f32; 4]] {
+        &self.each
     }
 
     pub(crate) fn projection(&self) -> &Projection {

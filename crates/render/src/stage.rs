@@ -2,8 +2,11 @@
 
 mod model;
 mod queries;
+mod surface;
+mod vertex;
 
 pub use model::{BodyId, ShapeId, Stage};
-pub(crate) use model::{BodyView, StageHit, Surface, rotation_of};
+pub(crate) use model::{BodyView, StageHit, rotation_of};
 pub(crate) use queries::BundleCandidates;
 pub use queries::RayHit;
+pub(crate) use surface::{Surface, Surfaces, turned};

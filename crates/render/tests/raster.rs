@@ -9,7 +9,9 @@ use glam::{DQuat, DVec3};
 use trocar_camera::{Camera, CameraModel, Distortion, Endoscope, Fisheye};
 use trocar_core::Pose;
 use trocar_geometry::TriMesh;
-use trocar_render::{Appearance, Film, Light, Picture, RayGenerator, RenderSettings, Stage, SurfaceKind, render};
+use trocar_render::{
+    Appearance, Film, Light, Noise, Picture, RayGenerator, RenderSettings, Stage, SurfaceKind, render, render_into,
+};
 
 /// Two pictures of the same stage.
 struct Pair {
@@ -246,4 +248,57 @@ fn raster_does_not_depend_on_thread_count() {
     };
     let one = picture(1);
     assert!(one == picture(2) && one == picture(5));
+}
+
+/// What a stage keeps between pictures does not change them: bodies rest and move, deform, are lit
+/// anew and seen through several cameras, and each picture has the bits of the first picture of a
+/// copy, which keeps nothing.
+#[test]
+fn pictures_do_not_depend_on_earlier_ones() {
+    let mut stage = stage();
+    let rest = sphere(DVec3::new(0.0, 0.0, 0.15), 0.03, 30);
+    let (soft, _) = stage.add_mesh(&rest, 95, &Appearance::tissue([200, 80, 70])).unwrap();
+    let (_, mover) = stage.add_mesh(&sphere(DVec3::ZERO, 0.01, 12), 96, &Appearance::steel()).unwrap();
+    let (_, rarely) = stage.add_mesh(&sphere(DVec3::ZERO, 0.02, 12), 97, &Appearance::steel()).unwrap();
+    // Two at the same depth, of which the first moves there: the order of drawing must not decide.
+    let square = quad(DVec3::new(0.04, 0.04, 0.32), 0.2 * DVec3::X, 0.2 * DVec3::Y);
+    let (_, patch) = stage.add_mesh(&square, 98, &Appearance::matte([20, 200, 20])).unwrap();
+    stage.add_mesh(&square, 99, &Appearance::matte([200, 20, 20])).unwrap();
+    let poses = poses();
+    let lenses = lenses();
+    let eyes = [(0, 0), (1, 1), (5, 3)].map(|(lens, pose): (usize, usize)| {
+        let (lens, pose): (&(_, CameraModel), _) = (&lenses[lens], poses[pose]);
+        (RayGenerator::new(lens.1).with_circular_image(1.1), pose)
+    });
+    let mut quick = Picture::default();
+    for frame in 0..100_u32 {
+        let t = f64::from(frame);
+        let at = |x: f64, y: f64| Pose { translation: DVec3::new(x, y, 0.12), ..Pose::IDENTITY };
+        if frame % 50 < 12 {
+            stage.place(mover, &at(0.02 * t.sin(), 0.02 * t.cos())).unwrap();
+        }
+        if frame % 45 == 0 {
+            stage.place(rarely, &at(0.04, -0.02 + 4e-4 * t)).unwrap();
+        }
+        if (5..9).contains(&frame) || frame == 80 {
+            let bent: Vec<DVec3> =
+                rest.vertices.iter().map(|p| *p + 0.01 * (60.0 * p.y + t).sin() * DVec3::X).collect();
+            stage.deform(soft, &bent).unwrap();
+        }
+        if (20..60).contains(&frame) {
+            let lift = DVec3::Z * if frame % 2 == 0 { 0.0 } else { 1e-3 };
+            stage.place(patch, &Pose { translation: lift, ..Pose::IDENTITY }).unwrap();
+        }
+        stage.lights = vec![Light::endoscope(&eyes[0].1, 0.0025, if frame < 70 { 0.12 } else { 0.15 })];
+        let noise = (frame % 7 == 3).then_some(Noise { shot: 0.015, read: 0.003, seed: 1, frame });
+        let film = Film { noise, ..Film::endoscope() };
+        let (rays, pose) = &eyes[if frame % 10 == 9 { 1 + usize::from(frame % 20 == 9) } else { 0 }];
+        let settings = RenderSettings::Preview { shadows: frame % 9 == 4 };
+        render_into(&mut quick, &mut stage, rays, pose, &settings, &film);
+        assert!(quick == render(&mut stage.clone(), rays, pose, &settings, &film), "frame {frame}");
+        let expected = if frame >= 60 || (frame >= 20 && frame % 2 == 1) { 99 } else { 98 };
+        let squares: Vec<&u16> = quick.labels.iter().filter(|l| [98, 99].contains(*l)).collect();
+        assert!(squares.iter().all(|l| **l == expected), "frame {frame}");
+        assert!(squares.len() > 100 || frame % 10 == 9, "frame {frame}: {}", squares.len());
+    }
 }

@@ -245,6 +245,12 @@ impl CameraRig {
         Ok(&self.picture)
     }
 
+    /// Frees what is kept of earlier pictures, see [`trocar_render::render_into`]. The next ones are
+    /// made from nothing and are the same.
+    pub fn forget_pictures(&mut self) {
+        self.visible.stage.forget_pictures();
+    }
+
     /// Number of triangles on the stage.
     pub fn triangles(&self) -> usize {
         self.visible.stage.triangles()

@@ -1,7 +1,7 @@
 //! Lamps seen from eight points at once, for previews.
 
 use super::Lamp;
-use crate::raster::{Vec8, dot, minus, splat};
+use crate::lanes::{Vec8, dot, minus, splat};
 use fearless_simd::{Simd, SimdBase, SimdFloat, f32x8, mask32x8};
 use glam::Vec3A;
 

@@ -1,8 +1,8 @@
 //! Materials at eight points at once, for previews.
 
 use super::{Kind, Material};
+use crate::lanes::{LANES, Vec8, cross, dot, splat};
 use crate::microfacet::GgxLobe;
-use crate::raster::{LANES, Vec8, cross, dot, splat};
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, f32x8, mask32x8};
 use std::f32::consts::{FRAC_1_PI, PI};
 

@@ -1,7 +1,7 @@
 //! Clusters of neighbouring triangles of a shape, with their vertices in order.
 
-use super::LANES;
 use crate::bvh::Bounds;
+use crate::lanes::LANES;
 use glam::{DVec3, Vec3A};
 use std::sync::Arc;
 use trocar_geometry::TriMesh;
@@ -12,19 +12,19 @@ pub(super) const MOST: usize = 96;
 /// The clusters of a shape.
 #[derive(Clone, Debug)]
 pub(crate) struct Clusters {
-    pub(super) fixed: Arc<Fixed>,
+    pub(crate) fixed: Arc<Fixed>,
     /// Vertices of the clusters in order, by axis. A vertex on the border of clusters is in each.
-    pub(super) vertices: Arc<[Vec<f32>; 3]>,
+    pub(crate) vertices: Arc<[Vec<f32>; 3]>,
     /// Bounding spheres of the clusters: centre and radius. The radius of unused lanes is negative
     /// infinity.
-    pub(super) spheres: Arc<[Vec<f32>; 4]>,
+    pub(crate) spheres: Arc<[Vec<f32>; 4]>,
     /// The box of all finite vertices.
     bounds: Bounds,
 }
 
 /// What does not change when the shape deforms.
 #[derive(Debug)]
-pub(super) struct Fixed {
+pub(crate) struct Fixed {
     pub clusters: Vec<Cluster>,
     /// Vertex of the shape for each vertex of a cluster.
     source: Vec<u32>,
@@ -38,7 +38,7 @@ pub(super) struct Fixed {
 
 /// Ranges of a cluster. Both start at a multiple of [`LANES`].
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Cluster {
+pub(crate) struct Cluster {
     pub first_vertex: u32,
     pub vertices: u32,
     pub first_triangle: u32,

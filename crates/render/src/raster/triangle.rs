@@ -1,13 +1,13 @@
 //! A triangle seen from the eye: the test of eight pixels.
 
-use super::{Vec8, splat};
+use crate::lanes::{Vec8, cross, dot, minus, splat};
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x8, u32x8};
 
 /// Eight triangles as seen from the eye, in the camera frame.
 ///
 /// The planes through the eye and the edges face inward, and the plane of the triangle faces away
 /// from the eye.
-pub(super) struct Eight<S: Simd> {
+pub(crate) struct Eight<S: Simd> {
     edges: [Vec8<S>; 3],
     plane: Vec8<S>,
     /// Distance of the plane from the eye, times the length of its normal.
@@ -18,10 +18,10 @@ pub(super) struct Eight<S: Simd> {
 }
 
 /// Numbers of [`Eight`] in memory, by lane last.
-pub(super) struct Stored([[f32; 8]; 15]);
+pub(crate) struct Stored([[f32; 8]; 15]);
 
 /// One triangle in all lanes.
-pub(super) struct One<S: Simd> {
+pub(crate) struct One<S: Simd> {
     edges: [Vec8<S>; 3],
     plane: Vec8<S>,
     offset: f32x8<S>,
@@ -126,9 +126,10 @@ impl<S: Simd> One<S> {
         }
         let t = (self.offset / dot(ray, self.plane)).max(self.near).min(self.far);
         let before = f32x8::from_slice(simd, &depth[at..at + 8]);
-        let nearest = inside & t.simd_lt(before) & t.simd_gt(zero);
-        nearest.select(t, before).store_slice(&mut depth[at..at + 8]);
         let held = u32x8::from_slice(simd, &triangle[at..at + 8]);
+        let nearer = t.simd_lt(before) | (t.simd_eq(before) & self.number.simd_lt(held));
+        let nearest = inside & nearer & t.simd_gt(zero);
+        nearest.select(t, before).store_slice(&mut depth[at..at + 8]);
         nearest.select(self.number, held).store_slice(&mut triangle[at..at + 8]);
     }
 
@@ -154,21 +155,4 @@ impl<S: Simd> One<S> {
 #[inline(always)]
 fn times<S: Simd>(a: Vec8<S>, b: f32x8<S>) -> Vec8<S> {
     [a[0] * b, a[1] * b, a[2] * b]
-}
-
-#[inline(always)]
-pub(crate) fn minus<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-pub(crate) fn dot<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> f32x8<S> {
-    (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
-}
-
-/// The cross product. Exchanging the arguments changes its sign and no other bit, so that an edge
-/// is the same for both of its triangles.
-#[inline(always)]
-pub(crate) fn cross<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

@@ -1,9 +1,12 @@
 //! A stage: shapes, some of which deform, and the bodies that show them at a pose.
 
+use super::vertex::{Vertex, vector};
+use crate::background::Memory;
 use crate::bvh::{Bounds, BoxTree, Ray, TriangleTree};
+use crate::lanes::Vec8;
 use crate::light::{Lamp, Light};
 use crate::material::{Appearance, Material};
-use crate::raster::{Clusters, Vec8, View, Visibility};
+use crate::raster::{Clusters, View};
 use crate::{Error, Result, srgb};
 use fearless_simd::{Level, Simd};
 use glam::{DVec3, Mat3A, Quat, Vec3A};
@@ -42,8 +45,10 @@ pub struct Stage {
     lamps: Vec<Lamp>,
     stale: bool,
     pub(crate) level: Level,
-    /// Memory for pictures.
-    pub(crate) visibility: Visibility,
+    /// Number of changes of shapes and bodies so far.
+    changes: u64,
+    /// Memory for previews.
+    pub(crate) memory: Memory,
     /// Lights, in the world frame.
     pub lights: Vec<Light>,
     /// Linear radiance of the uniform environment.
@@ -55,28 +60,32 @@ pub(super) struct Shape {
     pub(super) tree: Arc<TriangleTree>,
     /// Whether the vertices have moved since the tree was fitted.
     tree_stale: bool,
+    /// Number of its last change.
+    change: u64,
     clusters: Clusters,
     positions: Arc<Vec<Vec3A>>,
     triangles: Arc<Vec<[u32; 3]>>,
-    normals: Arc<Vec<Vec3A>>,
-    /// Linear colour per vertex; empty if the mesh has none.
-    colors: Arc<Vec<Vec3A>>,
+    pub(super) vertices: Arc<Vec<Vertex>>,
+    /// Whether the vertices have colours.
+    pub(super) is_colored: bool,
 }
 
 #[derive(Clone, Debug)]
 pub(super) struct Body {
     pub(super) shape: usize,
+    /// Number of its last change of pose.
+    change: u64,
     label: u16,
     /// Number of its first triangle among those of all bodies.
-    first_triangle: u32,
+    pub(super) first_triangle: u32,
     material: Arc<Material>,
     /// Material for paths that have bounced before.
     path_material: Arc<Material>,
     /// Linear colour, used if the shape has none.
-    color: Vec3A,
+    pub(super) color: Vec3A,
     /// Whether the pose is the identity.
     pub(super) is_identity: bool,
-    rotation: Mat3A,
+    pub(super) rotation: Mat3A,
     /// Inverse rotation.
     pub(super) inverse_rotation: Mat3A,
     pub(super) translation: Vec3A,
@@ -105,18 +114,6 @@ pub(crate) struct StageHit {
     pub(super) v: f32,
 }
 
-/// A point on a surface, in the world frame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Surface {
-    pub position: Vec3A,
-    /// Unit normal of the triangle, towards the origin of the ray.
-    pub flat: Vec3A,
-    /// Interpolated unit normal, on the same side.
-    pub smooth: Vec3A,
-    /// Linear colour.
-    pub albedo: Vec3A,
-}
-
 impl Default for Stage {
     fn default() -> Self {
         Self::new()
@@ -134,7 +131,8 @@ impl Stage {
             lamps: Vec::new(),
             stale: true,
             level: Level::new(),
-            visibility: Visibility::default(),
+            changes: 0,
+            memory: Memory::default(),
             lights: Vec::new(),
             environment: [0.0; 3],
         }
@@ -151,19 +149,25 @@ impl Stage {
         }
         let positions: Vec<Vec3A> = mesh.vertices.iter().map(|p| p.as_vec3a()).collect();
         let tree = TriangleTree::new(&positions, &mesh.triangles);
-        let colored = mesh.colors.len() == mesh.vertices.len();
-        let colors =
-            if colored { mesh.colors.iter().map(|c| srgb::to_linear(*c).into()).collect() } else { Vec::new() };
+        let is_colored = mesh.colors.len() == mesh.vertices.len();
+        let mut vertices = vec![Vertex::default(); positions.len()];
+        if is_colored {
+            for (vertex, color) in vertices.iter_mut().zip(&mesh.colors) {
+                let [r, g, b] = srgb::to_linear(*color);
+                vertex.color = [r, g, b, 0.0];
+            }
+        }
         let mut shape = Shape {
             clusters: Clusters::new(mesh, &positions, tree.order()),
             tree: Arc::new(tree),
             tree_stale: false,
+            change: 0,
             positions: Arc::new(positions),
             triangles: Arc::new(mesh.triangles.clone()),
-            normals: Arc::default(),
-            colors: Arc::new(colors),
+            vertices: Arc::new(vertices),
+            is_colored,
         };
-        shape.update_normals();
+        shape.update_vertices();
         self.shapes.push(shape);
         Ok(ShapeId(self.shapes.len() - 1))
     }
@@ -186,7 +190,9 @@ impl Stage {
         }
         found.clusters.follow(&found.positions);
         found.tree_stale = true;
-        found.update_normals();
+        found.update_vertices();
+        self.changes += 1;
+        found.change = self.changes;
         self.stale = true;
         Ok(())
     }
@@ -207,6 +213,7 @@ impl Stage {
         }
         self.bodies.push(Body {
             shape: shape.0,
+            change: 0,
             label,
             first_triangle: first_triangle as u32,
             path_material: Arc::new(Material::new(&appearance.surface.for_paths())),
@@ -218,6 +225,7 @@ impl Stage {
             translation: Vec3A::ZERO,
         });
         let id = BodyId(self.bodies.len() - 1);
+        self.stale = true;
         self.place(id, pose)?;
         Ok(id)
     }
@@ -229,10 +237,15 @@ impl Stage {
     pub fn place(&mut self, body: BodyId, pose: &Pose) -> Result<()> {
         let unknown = Error::Unknown { what: "body", index: body.0, count: self.bodies.len() };
         let body = self.bodies.get_mut(body.0).ok_or(unknown)?;
-        body.is_identity = *pose == Pose::IDENTITY;
-        body.rotation = rotation_of(pose);
-        body.inverse_rotation = body.rotation.transpose();
-        body.translation = pose.translation.as_vec3a();
+        let (rotation, translation) = (rotation_of(pose), pose.translation.as_vec3a());
+        let is_identity = *pose == Pose::IDENTITY;
+        if (rotation, translation, is_identity) == (body.rotation, body.translation, body.is_identity) {
+            return Ok(());
+        }
+        (body.rotation, body.translation, body.is_identity) = (rotation, translation, is_identity);
+        body.inverse_rotation = rotation.transpose();
+        self.changes += 1;
+        body.change = self.changes;
         self.stale = true;
         Ok(())
     }
@@ -250,6 +263,12 @@ impl Stage {
     /// Number of triangles of all bodies.
     pub fn triangles(&self) -> usize {
         self.bodies.iter().map(|b| self.shapes[b.shape].triangles.len()).sum()
+    }
+
+    /// Frees what is kept of earlier previews, see [`crate::render_into`]. The next ones are made from
+    /// nothing and are the same.
+    pub fn forget_pictures(&mut self) {
+        self.memory = Memory::default();
     }
 
     /// Updates the lamps.
@@ -293,15 +312,11 @@ impl Stage {
         self.bodies[hit.body as usize].label
     }
 
-    /// The body that triangle `number` belongs to. `guess` is tried first.
-    #[inline]
-    pub(crate) fn body_of(&self, number: u32, guess: usize) -> usize {
-        let body = &self.bodies[guess];
-        let inside = number.checked_sub(body.first_triangle);
-        if inside.is_some_and(|n| (n as usize) < self.shapes[body.shape].triangles.len()) {
-            return guess;
-        }
-        self.bodies.partition_point(|b| b.first_triangle <= number).saturating_sub(1)
+    /// The body that triangle `number` belongs to, and the numbers of its triangles.
+    pub(crate) fn body_of(&self, number: u32) -> (usize, std::ops::Range<u32>) {
+        let index = self.bodies.partition_point(|b| b.first_triangle <= number).saturating_sub(1);
+        let body = &self.bodies[index];
+        (index, body.first_triangle..body.first_triangle + self.shapes[body.shape].triangles.len() as u32)
     }
 
     #[inline]
@@ -312,6 +327,11 @@ impl Stage {
     #[inline]
     pub(crate) fn material_of(&self, body: usize) -> &Material {
         &self.bodies[body].material
+    }
+
+    /// For each body the number of its last change: different numbers, other places.
+    pub(crate) fn changes(&self) -> impl Iterator<Item = u64> {
+        self.bodies.iter().map(|b| b.change.max(self.shapes[b.shape].change))
     }
 
     /// All bodies as a camera sees them.
@@ -336,84 +356,6 @@ impl Stage {
     #[inline]
     pub(crate) fn path_material(&self, hit: &StageHit) -> &Material {
         &self.bodies[hit.body as usize].path_material
-    }
-
-    /// The surface point that a ray in `direction` hit.
-    #[inline]
-    pub(crate) fn surface(&self, hit: &StageHit, direction: Vec3A) -> Surface {
-        let body = &self.bodies[hit.body as usize];
-        let shape = &self.shapes[body.shape];
-        let corners = shape.corners(hit.triangle);
-        let places = Corners::of(&shape.positions, corners);
-        self.surface_at(body, shape, corners, places, [hit.u, hit.v], direction)
-    }
-
-    /// The surface point of triangle `number` (among those of all bodies) of a body at parameter
-    /// `t` of a ray that meets the triangle.
-    #[inline]
-    pub(crate) fn surface_along(&self, body: usize, number: u32, origin: Vec3A, direction: Vec3A, t: f32) -> Surface {
-        let body = &self.bodies[body];
-        let shape = &self.shapes[body.shape];
-        let corners = shape.corners(number - body.first_triangle);
-        let mut p = origin + t * direction;
-        if !body.is_identity {
-            p = body.inverse_rotation * (p - body.translation);
-        }
-        let places = Corners::of(&shape.positions, corners);
-        let (x, y, p) = (places.1 - places.0, places.2 - places.0, p - places.0);
-        let normal = x.cross(y);
-        let share = 1.0 / normal.length_squared().max(f32::MIN_POSITIVE);
-        let at = [p.cross(y).dot(normal) * share, x.cross(p).dot(normal) * share];
-        self.surface_at(body, shape, corners, places, at, direction)
-    }
-
-    /// The surface point at barycentric coordinates of the second and third corner.
-    #[inline(always)]
-    fn surface_at(
-        &self,
-        body: &Body,
-        shape: &Shape,
-        corners: [usize; 3],
-        places: Corners,
-        at: [f32; 2],
-        direction: Vec3A,
-    ) -> Surface {
-        let mut position = places.mixed(at);
-        let mut flat = (places.1 - places.0).cross(places.2 - places.0);
-        let mut smooth = Corners::of(&shape.normals, corners).mixed(at);
-        if !body.is_identity {
-            position = body.rotation * position + body.translation;
-            flat = body.rotation * flat;
-            smooth = body.rotation * smooth;
-        }
-        flat = flat.normalize_or_zero();
-        if flat.dot(direction) > 0.0 {
-            flat = -flat;
-        }
-        if smooth.dot(flat) < 0.0 {
-            smooth = -smooth;
-        }
-        // An interpolated normal can face away from the eye; the triangle's normal replaces it.
-        let smooth = smooth.try_normalize().filter(|n| n.dot(direction) < 0.0).unwrap_or(flat);
-        let albedo = if shape.colors.is_empty() { body.color } else { Corners::of(&shape.colors, corners).mixed(at) };
-        Surface { position, flat, smooth, albedo }
-    }
-}
-
-/// A vector at each corner of a triangle.
-#[derive(Clone, Copy)]
-struct Corners(Vec3A, Vec3A, Vec3A);
-
-impl Corners {
-    #[inline(always)]
-    fn of(all: &[Vec3A], corners: [usize; 3]) -> Self {
-        Self(all[corners[0]], all[corners[1]], all[corners[2]])
-    }
-
-    #[inline(always)]
-    fn mixed(&self, [u, v]: [f32; 2]) -> Vec3A {
-        let Self(a, b, c) = *self;
-        a + u * (b - a) + v * (c - a)
     }
 }
 
@@ -468,29 +410,33 @@ impl Body {
 
 impl Shape {
     #[inline(always)]
-    fn corners(&self, triangle: u32) -> [usize; 3] {
+    pub(super) fn corners(&self, triangle: u32) -> [usize; 3] {
         let [a, b, c] = self.triangles[triangle as usize];
         [a as usize, b as usize, c as usize]
     }
 
-    /// Computes area-weighted vertex normals.
-    fn update_normals(&mut self) {
-        let normals = Arc::make_mut(&mut self.normals);
-        normals.clear();
-        normals.resize(self.positions.len(), Vec3A::ZERO);
-        for triangle in self.triangles.iter() {
-            let [a, b, c] = triangle.map(|v| v as usize);
+    /// Positions of the vertices and their area-weighted normals.
+    fn update_vertices(&mut self) {
+        let vertices = Arc::make_mut(&mut self.vertices);
+        for (vertex, p) in vertices.iter_mut().zip(self.positions.iter()) {
+            vertex.position = [p.x, p.y, p.z, 0.0];
+            vertex.normal = [0.0; 4];
+        }
+        for [a, b, c] in self.triangles.iter() {
+            let (a, b, c) = (*a as usize, *b as usize, *c as usize);
             if let (Some(p), Some(q), Some(r)) = (self.positions.get(a), self.positions.get(b), self.positions.get(c)) {
                 let normal = (*q - *p).cross(*r - *p);
                 if normal.is_finite() {
                     for v in [a, b, c] {
-                        normals[v] += normal;
+                        let sum = vector(&vertices[v].normal) + normal;
+                        vertices[v].normal = [sum.x, sum.y, sum.z, 0.0];
                     }
                 }
             }
         }
-        for normal in normals {
-            *normal = normal.normalize_or_zero();
+        for vertex in vertices {
+            let normal = vector(&vertex.normal).normalize_or_zero();
+            vertex.normal = [normal.x, normal.y, normal.z, 0.0];
         }
     }
 }

@@ -1,12 +1,12 @@
 //! A band of rows of the picture: the clusters that it may show, and their triangles.
 
-use super::clusters::{Cluster, Clusters};
-use super::triangle::{Eight, One};
-use super::visibility::View;
-use super::{LANES, splat};
+use crate::lanes::{LANES, Vec8, gathered, splat};
+use crate::raster::{Cluster, Clusters, Eight, One, View};
 use crate::rays::TILE;
 use crate::stage::{BodyView, Stage};
-use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8};
+use fearless_simd::{
+    Simd, SimdBase, SimdCvtTruncate, SimdFloat, SimdInterleaved, SimdMask, SimdSplit, f32x4, f32x8, u32x8,
+};
 use glam::Vec3A;
 
 /// Images of triangles that are longer than this (px) are sought in tiles of pixels first.
@@ -16,8 +16,8 @@ const SMALL: f32 = 16.0;
 /// eight pixels at a time. A power of two.
 const TINY: usize = 4;
 
-/// Places for the vertices of a cluster, a power of two.
-const PLACES: usize = 128;
+/// Places for the vertices of a cluster: one for each number of a byte.
+const PLACES: usize = 256;
 
 /// A band of rows.
 pub(super) struct Band<'a> {
@@ -26,6 +26,8 @@ pub(super) struct Band<'a> {
     rows: usize,
     /// Rays of the band, by axis.
     rays: [&'a [f32]; 3],
+    /// The same rays, one by one.
+    each: &'a [[f32; 4]],
     depth: &'a mut [f32],
     triangle: &'a mut [u32],
     /// Inward normals of planes through the eye between which all rays of the band lie; zero where
@@ -33,10 +35,12 @@ pub(super) struct Band<'a> {
     planes: [Vec3A; 4],
 }
 
-/// Vertices of a cluster in the camera frame, and their image points, by axis.
+/// Vertices of a cluster.
 struct Corners {
-    place: [[f32; PLACES]; 3],
-    image: [[f32; PLACES]; 2],
+    /// In the camera frame; the last number is not used.
+    place: [[f32; 4]; PLACES],
+    /// Image points; the last two numbers are not used.
+    image: [[f32; 4]; PLACES],
 }
 
 impl<'a> Band<'a> {
@@ -45,17 +49,18 @@ impl<'a> Band<'a> {
         let stride = view.rays.stride();
         let [x, y, z] = view.rays.axes();
         let held = first_row * stride..first_row * stride + depth.len();
+        let each = &view.rays.each()[held.clone()];
         let rays = [&x[held.clone()], &y[held.clone()], &z[held]];
         let rows = depth.len() / stride;
         let planes = planes(view, first_row / TILE..(first_row + rows).div_ceil(TILE));
-        Self { view, first_row, rows, rays, depth, triangle, planes }
+        Self { view, first_row, rows, rays, each, depth, triangle, planes }
     }
 
-    /// Draws all bodies.
+    /// Draws the bodies that `drawn` says.
     #[inline(always)]
-    pub fn draw<S: Simd>(&mut self, simd: S, stage: &Stage) {
-        let mut corners = Corners { place: [[0.0; PLACES]; 3], image: [[0.0; PLACES]; 2] };
-        for body in stage.bodies_seen_from(self.view) {
+    pub fn draw<S: Simd>(&mut self, simd: S, stage: &Stage, drawn: &impl Fn(usize) -> bool) {
+        let mut corners = Corners { place: [[0.0; 4]; PLACES], image: [[0.0; 4]; PLACES] };
+        for (_, body) in stage.bodies_seen_from(self.view).enumerate().filter(|(k, _)| drawn(*k)) {
             let clusters = body.clusters;
             let culled = clusters.fixed.closed && !body.holds_eye();
             let spheres = &*clusters.spheres;
@@ -95,6 +100,22 @@ impl<'a> Band<'a> {
         seen.to_bitmask()
     }
 
+    /// Which of eight triangles of corners `p` lie beyond one of the planes around the band.
+    #[inline(always)]
+    fn outside<S: Simd>(&self, simd: S, p: &[Vec8<S>; 3]) -> u64 {
+        let zero = splat(simd, 0.0);
+        let mut outside = 0;
+        for plane in &self.planes {
+            let mut beyond = u64::MAX;
+            for p in p {
+                let height = (p[0] * plane.x + p[1] * plane.y) + p[2] * plane.z;
+                beyond &= height.simd_lt(zero).to_bitmask();
+            }
+            outside |= beyond;
+        }
+        outside
+    }
+
     /// Moves the vertices of a cluster into the camera frame and projects them.
     #[inline(always)]
     fn move_corners<S: Simd>(
@@ -116,12 +137,8 @@ impl<'a> Band<'a> {
             ];
             let p = body.to_camera(simd, p);
             let image = projection.project(simd, p);
-            for axis in 0..3 {
-                p[axis].store_slice(&mut corners.place[axis][k..k + LANES]);
-            }
-            for axis in 0..2 {
-                image[axis].store_slice(&mut corners.image[axis][k..k + LANES]);
-            }
+            scatter(simd, p, &mut corners.place[k..k + LANES]);
+            scatter(simd, [image[0], image[1], image[1]], &mut corners.image[k..k + LANES]);
         }
     }
 
@@ -148,8 +165,9 @@ impl<'a> Band<'a> {
                 &fixed.corners[1][first..first + LANES],
                 &fixed.corners[2][first..first + LANES],
             ];
-            let [ua, ub, uc] = gather(simd, &corners.image[0], &of);
-            let [va, vb, vc] = gather(simd, &corners.image[1], &of);
+            let [ua, va, _] = gather(simd, &corners.image, of[0]);
+            let [ub, vb, _] = gather(simd, &corners.image, of[1]);
+            let [uc, vc, _] = gather(simd, &corners.image, of[2]);
             let sum = ((ua + ub) + uc) + ((va + vb) + vc);
             let known = sum.simd_eq(sum);
             let (low_u, high_u) = (ua.min(ub).min(uc), ua.max(ub).max(uc));
@@ -167,15 +185,25 @@ impl<'a> Band<'a> {
             // Lines that are bent much may be anywhere.
             let loose = if is_straight { !known.to_bitmask() } else { !known.to_bitmask() | large.to_bitmask() };
             let mut lanes = (boxed.to_bitmask() | loose) & used;
+            if culled && is_straight {
+                // Backs turn clockwise in the picture, whose y points down.
+                let turn = (ub - ua) * (vc - va) - (uc - ua) * (vb - va);
+                let back = known & turn.simd_gt((wide + tall) * 1e-3);
+                lanes &= !back.to_bitmask();
+            }
             if lanes == 0 {
                 continue;
             }
-            let [xa, xb, xc] = gather(simd, &corners.place[0], &of);
-            let [ya, yb, yc] = gather(simd, &corners.place[1], &of);
-            let [za, zb, zc] = gather(simd, &corners.place[2], &of);
-            let p = [[xa, ya, za], [xb, yb, zb], [xc, yc, zc]];
+            let p = [
+                gather(simd, &corners.place, of[0]),
+                gather(simd, &corners.place, of[1]),
+                gather(simd, &corners.place, of[2]),
+            ];
             let (eight, facing) = Eight::new(simd, &p, culled, projection.is_flat());
             lanes &= facing;
+            if loose & lanes != 0 {
+                lanes &= !(loose & self.outside(simd, &p));
+            }
             if lanes == 0 {
                 continue;
             }
@@ -183,8 +211,11 @@ impl<'a> Band<'a> {
             let (columns, rows) = (high_u - low_u + one, high_v - low_v + one);
             let few = (columns * rows).simd_le(splat(simd, TINY as f32)).to_bitmask();
             let tiled = large.to_bitmask() | loose;
-            let (low_u, high_u): ([f32; LANES], [f32; LANES]) = (low_u.into(), high_u.into());
-            let (low_v, high_v): ([f32; LANES], [f32; LANES]) = (low_v.into(), high_v.into());
+            // Lanes without a box hold anything here.
+            let low_u: [u32; LANES] = u32x8::truncate_from(low_u).into();
+            let high_u: [u32; LANES] = u32x8::truncate_from(high_u).into();
+            let low_v: [u32; LANES] = u32x8::truncate_from(low_v - top).into();
+            let high_v: [u32; LANES] = u32x8::truncate_from(high_v - top).into();
             let tiny = few & lanes & !loose;
             if tiny != 0 {
                 let numbers = (body.first_triangle, &fixed.triangle[first..first + LANES]);
@@ -204,7 +235,7 @@ impl<'a> Band<'a> {
                     continue;
                 }
                 let columns = [low_u[lane] as usize, high_u[lane] as usize];
-                let rows = [low_v[lane] as usize - self.first_row, high_v[lane] as usize - self.first_row];
+                let rows = [low_v[lane] as usize, high_v[lane] as usize];
                 if tiled >> lane & 1 == 1 {
                     self.tiles(simd, &one, columns, rows);
                 } else {
@@ -222,7 +253,7 @@ impl<'a> Band<'a> {
         simd: S,
         eight: &Eight<S>,
         lanes: u64,
-        [low_u, high_u, low_v, high_v]: [&[f32; LANES]; 4],
+        [low_u, high_u, low_v, high_v]: [&[u32; LANES]; 4],
         (first, numbers): (u32, &[u32]),
     ) {
         let stride = self.view.rays.stride();
@@ -234,36 +265,31 @@ impl<'a> Band<'a> {
         while left != 0 {
             let lane = left.trailing_zeros() as usize & (LANES - 1);
             left &= left - 1;
-            let (u, v) = (low_u[lane] as usize, low_v[lane] as usize - self.first_row);
-            let columns = (high_u[lane] as usize - u).min(TINY - 1) + 1;
-            let rows = (high_v[lane] as usize - self.first_row - v).min(TINY - 1) + 1;
+            let (low, columns) = (low_u[lane] as usize, (high_u[lane] - low_u[lane]) as usize);
+            let (mut place, last) = (low_v[lane] as usize * stride + low, high_v[lane] as usize * stride + low);
             let mut at = 0;
-            for row in v..v + rows {
-                for column in u..u + columns {
-                    places[at & (TINY - 1)][lane] = row * stride + column;
+            while place <= last {
+                for column in 0..=columns {
+                    places[at & (TINY - 1)][lane] = place + column;
                     at += 1;
                 }
+                place += stride;
             }
             most = most.max(at.min(TINY));
         }
         for places in &places[..most] {
-            let mut ray = [[0.0; LANES]; 3];
-            for axis in 0..3 {
-                for lane in 0..LANES {
-                    ray[axis][lane] = self.rays[axis][places[lane]];
-                }
-            }
-            let ray =
-                [f32x8::from_slice(simd, &ray[0]), f32x8::from_slice(simd, &ray[1]), f32x8::from_slice(simd, &ray[2])];
+            let [a, b, c, d, e, f, g, h] = *places;
+            let each = self.each;
+            let ray = gathered(simd, [&each[a], &each[b], &each[c], &each[d], &each[e], &each[f], &each[g], &each[h]]);
             let (met, t) = eight.test(simd, &ray);
             let mut met = met & lanes;
             while met != 0 {
                 let lane = met.trailing_zeros() as usize & (LANES - 1);
                 met &= met - 1;
                 let at = places[lane];
-                if t[lane] < self.depth[at] {
-                    self.depth[at] = t[lane];
-                    self.triangle[at] = first + numbers[lane];
+                let number = first + numbers[lane];
+                if (t[lane], number) < (self.depth[at], self.triangle[at]) {
+                    (self.depth[at], self.triangle[at]) = (t[lane], number);
                 }
             }
         }
@@ -317,16 +343,23 @@ impl<'a> Band<'a> {
     }
 }
 
-/// Numbers of eight triangles' corners, by corner.
+/// The vectors at eight places.
 #[inline(always)]
-fn gather<S: Simd>(simd: S, from: &[f32; PLACES], of: &[&[u8]; 3]) -> [f32x8<S>; 3] {
-    let mut held = [[0.0; LANES]; 3];
-    for k in 0..3 {
-        for lane in 0..LANES {
-            held[k][lane] = from[of[k][lane] as usize & (PLACES - 1)];
-        }
-    }
-    [f32x8::from_slice(simd, &held[0]), f32x8::from_slice(simd, &held[1]), f32x8::from_slice(simd, &held[2])]
+fn gather<S: Simd>(simd: S, from: &[[f32; 4]; PLACES], at: &[u8]) -> Vec8<S> {
+    let Some(at) = at.first_chunk::<LANES>() else { return [splat(simd, 0.0); 3] };
+    let [a, b, c, d, e, f, g, h] = *at;
+    let (a, b, c, d) = (&from[a as usize], &from[b as usize], &from[c as usize], &from[d as usize]);
+    let (e, f, g, h) = (&from[e as usize], &from[f as usize], &from[g as usize], &from[h as usize]);
+    gathered(simd, [a, b, c, d, e, f, g, h])
+}
+
+/// Stores eight vectors; the fourth number of each is not used.
+#[inline(always)]
+fn scatter<S: Simd>(simd: S, v: Vec8<S>, to: &mut [[f32; 4]]) {
+    let to = to.as_flattened_mut();
+    let (low, high) = ([v[0].split(), v[1].split(), v[2].split()], f32x4::splat(simd, 0.0));
+    f32x4::store_four_interleaved([low[0].0, low[1].0, low[2].0, high], &mut to[..2 * LANES]);
+    f32x4::store_four_interleaved([low[0].1, low[1].1, low[2].1, high], &mut to[2 * LANES..]);
 }
 
 /// Inward normals of the planes through the eye that bound the rays of rows of tiles; zero if some

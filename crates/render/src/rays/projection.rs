@@ -3,8 +3,8 @@
 //! Whether a pixel shows a triangle is decided with the pixel's own ray. The projection only says
 //! which pixels to ask, so it may be approximate.
 
-use super::{LANES, splat};
-use crate::rays::RayGenerator;
+use super::RayGenerator;
+use crate::lanes::{LANES, splat};
 use fearless_simd::{Select, Simd, SimdBase, SimdFloat, f32x8};
 use glam::Vec3A;
 use trocar_camera::{CameraModel, Distortion, Fisheye};

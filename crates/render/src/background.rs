@@ -1,0 +1,194 @@
+//! What previews through one camera have in common: bodies at rest, and their light.
+//!
+//! Cameras of a cell stand still, and so does most of what they see. Bodies that have rested for a
+//! while are drawn and lit once for a camera. Later pictures start with them.
+
+use crate::film::Film;
+use crate::light::Light;
+use crate::picture::Picture;
+use crate::raster::{View, Visibility};
+use glam::{Mat3A, Vec3A};
+use trocar_camera::CameraModel;
+
+/// Number of cameras, each at one pose, of which a background is kept.
+const CAMERAS: usize = 4;
+
+/// A body is at rest after so many pictures through a camera in which it has not moved, twice as many
+/// whenever it has moved after a rest. Bodies that have not moved between the first two pictures are
+/// at rest too.
+const REST: u32 = 8;
+
+/// Memory for previews of a stage.
+#[derive(Debug, Default)]
+pub(crate) struct Memory {
+    /// Of the picture that is being made.
+    pub visibility: Visibility,
+    /// The camera that was used last comes last.
+    cameras: Vec<Background>,
+}
+
+/// What is kept of pictures through a camera.
+#[derive(Debug)]
+pub(crate) struct Background {
+    lens: (CameraModel, Option<f32>),
+    rotation: Mat3A,
+    origin: Vec3A,
+    bodies: Vec<Rest>,
+    /// Bodies that are drawn.
+    visibility: Option<Visibility>,
+    /// What the last picture was lit with.
+    look: Option<Look>,
+    /// Light of the drawn bodies with that look.
+    picture: Option<Picture>,
+}
+
+/// How a body has moved.
+#[derive(Clone, Copy, Debug)]
+struct Rest {
+    /// Number of its last change.
+    change: u64,
+    /// Pictures since then.
+    pictures: u32,
+    /// Pictures after which it is at rest.
+    needed: u32,
+    is_drawn: bool,
+}
+
+/// A picture of bodies at rest, which others may cover.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Behind<'a> {
+    pub visibility: &'a Visibility,
+    pub picture: &'a Picture,
+}
+
+/// What the light of a picture depends on beside the bodies.
+#[derive(Clone, Debug, PartialEq)]
+struct Look {
+    lights: Vec<Light>,
+    environment: [f32; 3],
+    film: Film,
+}
+
+impl Clone for Memory {
+    /// Empty.
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl Memory {
+    /// What is kept for a camera, if bodies have changed last in the steps `changes`. There is
+    /// nothing in its first picture.
+    pub fn background(&mut self, view: &View<'_>, changes: impl Iterator<Item = u64>) -> &mut Background {
+        let found = self.cameras.iter().position(|b| b.is_of(view)).map(|at| self.cameras.remove(at));
+        let background = match found {
+            Some(mut background) => {
+                background.follow(changes);
+                background
+            }
+            None => Background::new(view, changes),
+        };
+        if self.cameras.len() >= CAMERAS {
+            self.cameras.remove(0);
+        }
+        let at = self.cameras.len();
+        self.cameras.push(background);
+        &mut self.cameras[at]
+    }
+}
+
+impl Background {
+    fn new(view: &View<'_>, changes: impl Iterator<Item = u64>) -> Self {
+        Self {
+            lens: view.rays.lens(),
+            rotation: view.rotation,
+            origin: view.origin,
+            bodies: changes.map(|change| Rest { change, pictures: REST - 1, needed: REST, is_drawn: false }).collect(),
+            visibility: None,
+            look: None,
+            picture: None,
+        }
+    }
+
+    fn is_of(&self, view: &View<'_>) -> bool {
+        self.lens == view.rays.lens() && self.rotation == view.rotation && self.origin == view.origin
+    }
+
+    /// Notes which bodies have moved since the last picture.
+    fn follow(&mut self, changes: impl Iterator<Item = u64>) {
+        for (k, change) in changes.enumerate() {
+            match self.bodies.get_mut(k) {
+                None => self.bodies.push(Rest { change, pictures: 0, needed: REST, is_drawn: false }),
+                Some(body) if body.change != change => {
+                    let needed = body.needed.saturating_mul(if body.rests() { 2 } else { 1 });
+                    *body = Rest { change, pictures: 0, needed, ..*body };
+                }
+                Some(body) => body.pictures = body.pictures.saturating_add(1),
+            }
+        }
+    }
+
+    /// Whether other bodies are at rest than those that are drawn.
+    pub fn is_stale(&self) -> bool {
+        self.bodies.iter().any(|b| b.rests() != b.is_drawn)
+    }
+
+    /// Whether a body is at rest. None is in the first picture.
+    pub fn rests(&self, body: usize) -> bool {
+        self.bodies.get(body).is_some_and(Rest::rests)
+    }
+
+    /// Whether a body is drawn.
+    pub fn shows(&self, body: usize) -> bool {
+        self.bodies.get(body).is_some_and(|b| b.is_drawn)
+    }
+
+    /// Whether all bodies that are drawn are at rest.
+    pub fn is_right(&self) -> bool {
+        self.bodies.iter().all(|b| b.rests() || !b.is_drawn)
+    }
+
+    /// Keeps the bodies at rest, drawn. Returns what was kept before, if it was lit.
+    pub fn keep(&mut self, drawn: Visibility) -> Option<(Visibility, Picture)> {
+        self.bodies.iter_mut().for_each(|b| b.is_drawn = b.rests());
+        let kept = self.bodies.iter().any(|b| b.is_drawn).then_some(drawn);
+        std::mem::replace(&mut self.visibility, kept).zip(self.picture.take())
+    }
+
+    /// The bodies at rest.
+    pub fn visibility(&self) -> Option<&Visibility> {
+        self.visibility.as_ref()
+    }
+
+    /// The bodies at rest, to be lit.
+    pub fn visibility_mut(&mut self) -> Option<&mut Visibility> {
+        self.visibility.as_mut()
+    }
+
+    /// Whether [`Self::keep_light`] is worth while: the picture before had this look too.
+    pub fn wants_light(&mut self, lights: &[Light], environment: [f32; 3], film: Film) -> bool {
+        let same = |l: &Look| l.lights == lights && l.environment == environment && l.film == film;
+        if !self.look.as_ref().is_some_and(same) {
+            self.look = Some(Look { lights: lights.to_vec(), environment, film });
+            self.picture = None;
+            return false;
+        }
+        self.visibility.is_some() && self.picture.is_none()
+    }
+
+    /// Keeps a picture of the bodies at rest in the last look.
+    pub fn keep_light(&mut self, picture: Picture) {
+        self.picture = Some(picture);
+    }
+
+    /// The bodies at rest and, if it is known, their light.
+    pub fn lit(&self) -> Option<Behind<'_>> {
+        Some(Behind { visibility: self.visibility.as_ref()?, picture: self.picture.as_ref()? })
+    }
+}
+
+impl Rest {
+    fn rests(&self) -> bool {
+        self.pictures >= self.needed
+    }
+}

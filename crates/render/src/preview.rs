@@ -1,0 +1,90 @@
+//! Previews: rasterised, with direct light.
+
+use crate::background::{Background, Behind};
+use crate::deferred::{Buffers, Shading, may_cast};
+use crate::film::Film;
+use crate::picture::{Picture, Rows};
+use crate::raster::{Seen, View, Visibility};
+use crate::stage::Stage;
+use crate::visibility::Drawing;
+use rayon::prelude::*;
+
+/// Rows that are drawn and shaded together, a multiple of a tile's. Fewer give more clusters that are
+/// in two bands, more give less to do in parallel.
+const ROWS: usize = 56;
+
+/// Makes a preview. It starts with the bodies at rest, if these are kept for the camera.
+pub(crate) fn preview(picture: &mut Picture, stage: &mut Stage, view: &View<'_>, shadows: bool, film: &Film) {
+    let mut memory = std::mem::take(&mut stage.memory);
+    let mut visibility = std::mem::take(&mut memory.visibility);
+    let background = memory.background(view, stage.changes());
+    keep(background, stage, view, film);
+    let drawn = |body| !background.rests(body);
+    let drawing = Drawing { stage, view, drawn: &drawn, behind: background.visibility() };
+    let casts = shadows && {
+        draw(&mut visibility, &drawing);
+        // Rays are at least as long as their parameter says.
+        may_cast(stage, view.origin, visibility.depth.iter().copied().fold(f32::INFINITY, f32::min))
+    };
+    let bands = picture.bands(view.rays.width() * ROWS).zip(visibility.bands(view.rays, ROWS));
+    if casts {
+        stage.update_acceleration();
+        let shading = Shading { shadows, ..Shading::new(stage, view) };
+        bands.for_each_init(Buffers::new, |buffers, ((k, rows), seen)| shade(&shading, k, rows, &seen, film, buffers));
+    } else {
+        let shading = Shading { behind: background.lit(), ..Shading::new(stage, view) };
+        bands.for_each_init(Buffers::new, |buffers, ((k, rows), seen)| {
+            if !shadows {
+                drawing.draw(k * ROWS, seen.depth, seen.triangle);
+            }
+            shade(&shading, k, rows, &seen, film, buffers);
+        });
+    }
+    memory.visibility = visibility;
+    stage.memory = memory;
+}
+
+/// Draws and lights the bodies at rest, if others are than before. What has come to rest is drawn
+/// before what is kept. Only pixels that show another triangle are lit.
+fn keep(background: &mut Background, stage: &Stage, view: &View<'_>, film: &Film) {
+    let mut before = None;
+    if background.is_stale() {
+        let behind = background.visibility().filter(|_| background.is_right());
+        let drawn = |body| background.rests(body) && !(behind.is_some() && background.shows(body));
+        let mut fresh = Visibility::default();
+        draw(&mut fresh, &Drawing { stage, view, drawn: &drawn, behind });
+        before = background.keep(fresh);
+    }
+    // Noise differs from picture to picture.
+    let clean = Film { noise: None, ..*film };
+    if background.wants_light(&stage.lights, stage.environment, clean) {
+        let mut lit = Picture::new(view.rays.width(), view.rays.height());
+        let behind = before.as_ref().map(|(visibility, picture)| Behind { visibility, picture });
+        let shading = Shading { behind, ..Shading::new(stage, view) };
+        if let Some(visibility) = background.visibility_mut() {
+            let bands = lit.bands(view.rays.width() * ROWS).zip(visibility.bands(view.rays, ROWS));
+            bands.for_each_init(Buffers::new, |buffers, ((k, rows), seen)| {
+                shade(&shading, k, rows, &seen, &clean, buffers);
+            });
+        }
+        background.keep_light(lit);
+    }
+}
+
+fn draw(visibility: &mut Visibility, drawing: &Drawing<'_>) {
+    let bands = visibility.bands(drawing.view.rays, ROWS).enumerate();
+    bands.for_each(|(k, seen)| drawing.draw(k * ROWS, seen.depth, seen.triangle));
+}
+
+fn shade(shading: &Shading<'_>, k: usize, mut rows: Rows<'_>, seen: &Seen<'_>, film: &Film, buffers: &mut Buffers) {
+    let (rays, first) = (shading.view.rays, k * ROWS);
+    if let Some(Behind { picture, .. }) = shading.behind {
+        rows.copy_from(picture, first * rays.width());
+    }
+    shading.shade(first, seen, &mut rows, buffers);
+    if shading.behind.is_some() && film.noise.is_none() {
+        rows.develop_parts(film, rays, first, &buffers.shaded);
+    } else {
+        rows.develop(film, rays, first);
+    }
+}
