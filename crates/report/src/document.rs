@@ -49,6 +49,13 @@ impl Table {
         Self { head: head.into_iter().map(Into::into).collect(), rows, only_page: false }
     }
 
+    /// A table of `rows` by columns: the name of each, units in round brackets, and its cell of a
+    /// row.
+    pub fn of<T>(rows: impl IntoIterator<Item = T>, columns: &[(&str, &dyn Fn(&T) -> String)]) -> Self {
+        let cells = |row| columns.iter().map(|(_, cell)| cell(&row)).collect();
+        Self::new(columns.iter().map(|(name, _)| *name), rows.into_iter().map(cells).collect())
+    }
+
     /// The same table on the page only, for long tables.
     #[must_use]
     pub fn on_page_only(self) -> Self {
@@ -60,8 +67,8 @@ impl Table {
         table::plain(&head, &self.rows)
     }
 
-    /// Aligned columns: the first left, the others right.
-    fn text(&self) -> String {
+    /// Lines for a terminal in aligned columns: the first left, the others right.
+    pub fn text(&self) -> String {
         let cells = |row: &[String]| row.iter().map(|c| plain(c)).collect::<Vec<_>>();
         let lines: Vec<Vec<String>> =
             std::iter::once(self.head.as_slice()).chain(self.rows.iter().map(Vec::as_slice)).map(cells).collect();

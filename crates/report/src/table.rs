@@ -34,6 +34,11 @@ pub fn percent(share: f64, decimals: usize) -> String {
     format!("{}\u{202f}%", fixed(100.0 * share, decimals))
 }
 
+/// "yes" or "no".
+pub fn yes_or_no(value: bool) -> String {
+    if value { "yes" } else { "no" }.to_owned()
+}
+
 /// A cell with more characters than this is a sentence. Its column gets room to be read in a table
 /// of many columns.
 const MAX_SHORT_CELL: usize = 40;

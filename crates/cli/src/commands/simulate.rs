@@ -37,7 +37,7 @@ pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<
         organ: arguments.organ.clone(),
         design: arguments.design.map(Into::into),
         jaw_force: arguments.jaw_force,
-        schedule: arguments.schedule.map(crate::cli::SolverName::schedule),
+        schedule: arguments.schedule.map(Into::into),
         threads: arguments.threads,
     };
     let result = match scene {

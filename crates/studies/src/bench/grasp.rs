@@ -274,33 +274,26 @@ impl Run {
 }
 
 fn document(r: &GraspBenchResult) -> Document {
-    let head = [
-        "Phase",
-        "Frames",
-        "Contact (ms)",
-        "Same motion (ms)",
-        "Distance (mm)",
-        "No contact (ms)",
-        "Iterations",
-        "Worst (ms)",
-        "Own share",
-        "Contact's share",
-    ];
-    let row = |p: &GraspPhaseTiming| {
-        let iterations = [p.with_contact_iterations, p.same_motion_iterations, p.without_contact_iterations];
-        vec![
-            p.phase.to_owned(),
-            p.frames.to_string(),
-            fixed(p.with_contact_ms, 2),
-            fixed(p.same_motion_ms, 2),
-            fixed(p.same_motion_off_mm, 4),
-            fixed(p.without_contact_ms, 2),
-            iterations.map(|n| fixed(n, 0)).join("/"),
-            fixed(p.worst_ms, 2),
-            percent(p.own_share, 1),
-            percent(p.contact_share, 1),
-        ]
+    let iterations = |p: &GraspPhaseTiming| {
+        [p.with_contact_iterations, p.same_motion_iterations, p.without_contact_iterations]
+            .map(|n| fixed(n, 0))
+            .join("/")
     };
+    let table = Table::of(
+        &r.phases,
+        &[
+            ("Phase", &|p| p.phase.to_owned()),
+            ("Frames", &|p| p.frames.to_string()),
+            ("Contact (ms)", &|p| fixed(p.with_contact_ms, 2)),
+            ("Same motion (ms)", &|p| fixed(p.same_motion_ms, 2)),
+            ("Distance (mm)", &|p| fixed(p.same_motion_off_mm, 4)),
+            ("No contact (ms)", &|p| fixed(p.without_contact_ms, 2)),
+            ("Iterations", &|p| iterations(p)),
+            ("Worst (ms)", &|p| fixed(p.worst_ms, 2)),
+            ("Own share", &|p| percent(p.own_share, 1)),
+            ("Contact's share", &|p| percent(p.contact_share, 1)),
+        ],
+    );
     let lines = [
         "Same motion: each frame again without contact but with its forces. No contact: without contact and its forces."
             .to_owned(),
@@ -318,7 +311,7 @@ fn document(r: &GraspBenchResult) -> Document {
         ),
     ];
     Document::new("Grasp", "Cost of contact with the gripper")
-        .with(Section::new("Phases", "").table(Table::new(head, r.phases.iter().map(row).collect())).lines(lines))
+        .with(Section::new("Phases", "").table(table).lines(lines))
 }
 
 #[cfg(test)]

@@ -79,8 +79,6 @@ pub struct MeshingResult {
     pub linearity: Option<f64>,
     /// Worker threads.
     pub threads: usize,
-    /// Path of the report.
-    pub report: String,
 }
 
 impl Study for MeshingBench {
@@ -117,7 +115,7 @@ impl Study for MeshingBench {
         let mut of_size: Vec<&MeshingRow> = rows.iter().filter(|r| r.series == "size").collect();
         of_size.sort_by_key(|r| r.tets);
         let linearity = per_tet(of_size.last().copied()).zip(per_tet(of_size.first().copied())).map(|(a, b)| a / b);
-        let result = MeshingResult { linearity, threads: rayon::current_num_threads(), report: job.report(), rows };
+        let result = MeshingResult { linearity, threads: rayon::current_num_threads(), rows };
         let document = document(&result)?;
         Ok((result, document))
     }

@@ -233,29 +233,18 @@ fn beside_paper(r: &RolloutsResult) -> Table {
 }
 
 fn controllers(rows: &[PolicyRow]) -> Table {
-    let head = [
-        "controller",
-        "rollouts",
-        "passed",
-        "attached",
-        "held",
-        "lift (mm)",
-        "RCM, loaded median (mm)",
-        "RCM, max. (mm)",
-        "diverged",
-    ];
-    let row = |p: &PolicyRow| {
-        vec![
-            p.policy.clone(),
-            count(p.episodes),
-            count(p.passed),
-            count(p.attached),
-            count(p.held_to_end),
-            or_dash(p.lift_median_mm, 1),
-            or_dash(p.rcm_median_mm, 4),
-            or_dash(p.rcm_max_mm, 3),
-            count(p.ends.diverged),
-        ]
-    };
-    Table::new(head, rows.iter().map(row).collect())
+    Table::of(
+        rows,
+        &[
+            ("controller", &|p| p.policy.clone()),
+            ("rollouts", &|p| count(p.episodes)),
+            ("passed", &|p| count(p.passed)),
+            ("attached", &|p| count(p.attached)),
+            ("held", &|p| count(p.held_to_end)),
+            ("lift (mm)", &|p| or_dash(p.lift_median_mm, 1)),
+            ("RCM, loaded median (mm)", &|p| or_dash(p.rcm_median_mm, 4)),
+            ("RCM, max. (mm)", &|p| or_dash(p.rcm_max_mm, 3)),
+            ("diverged", &|p| count(p.ends.diverged)),
+        ],
+    )
 }

@@ -131,8 +131,6 @@ impl Study for ControllerGridExperiment {
             trace: shown,
             plain_trace: plain,
             resumed,
-            seconds: job.seconds(),
-            report: job.report(),
         };
         let document = page::document(&result)?;
         Ok((result, document))
@@ -190,8 +188,6 @@ mod tests {
             plain_trace: (0..400).map(instant).collect(),
             rows,
             resumed: Resumed::default(),
-            seconds: 1.0,
-            report: String::new(),
         }
     }
 

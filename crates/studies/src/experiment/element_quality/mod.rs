@@ -94,8 +94,6 @@ impl Study for ElementQualityExperiment {
             nodes,
             tets,
             resumed,
-            seconds: job.seconds(),
-            report: job.report(),
         };
         let document = page::document(&result)?;
         Ok((result, document))
@@ -206,8 +204,6 @@ mod tests {
             nodes: 1,
             tets: 1,
             resumed: Resumed::default(),
-            seconds: 1.0,
-            report: String::new(),
         }
     }
 

@@ -90,8 +90,6 @@ impl Study for GraspDesignsExperiment {
             nodes,
             tets,
             resumed,
-            seconds: job.seconds(),
-            report: job.report(),
         };
         let document = page::document(&result)?;
         Ok((result, document))

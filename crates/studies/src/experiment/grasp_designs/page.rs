@@ -10,7 +10,7 @@ use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
-use trocar_report::table::{count, fixed};
+use trocar_report::table::{count, fixed, yes_or_no};
 
 pub(super) fn document(r: &GraspDesignsResult) -> Result<Document> {
     let mut document = Document::new("Grasp designs", "Four ways to hold the appendix");
@@ -190,48 +190,30 @@ fn snaps(r: &GraspDesignsResult, condition: Condition) -> Result<String> {
 }
 
 fn trials(r: &GraspDesignsResult) -> Section {
-    let head = [
-        "Condition",
-        "Design",
-        "s",
-        "Offset (mm)",
-        "Drag (mm)",
-        "Held",
-        "Lift (mm)",
-        "Slip (mm)",
-        "Snap (mm)",
-        "Activation step (mm)",
-        "Closing force (N)",
-        "Gap (mm)",
-        "Pull (N)",
-        "Yielded",
-        "Smallest volume",
-        "Suspensions",
-        "Remarks",
-    ];
-    let row = |t: &GraspTrial| {
-        let inverted = (t.inverted_peak > 0).then(|| format!("{} inverted", t.inverted_peak));
-        vec![
-            t.condition.name().to_owned(),
-            t.design.clone(),
-            fixed(t.at, 2),
-            fixed(t.offset_mm, 0),
-            t.drag_mm.map_or(String::new(), |d| fixed(d, 0)),
-            if t.held { "yes" } else { "no" }.to_owned(),
-            fixed(t.lift_mm, 1),
-            fixed(t.slip_mm, 2),
-            t.snap_mm.map_or(String::new(), |s| fixed(s, 2)),
-            fixed(t.activation_step_mm, 2),
-            fixed(t.closing_force_n, 2),
-            fixed(t.gap_mm, 1),
-            fixed(t.peak_constraint_n, 2),
-            count(t.yielded_substeps),
-            fixed(t.min_volume_ratio, 2),
-            suspensions(t.suspensions),
-            remarks(t.divergence.as_ref(), t.why.as_ref(), (t.slipped, t.torn), inverted),
-        ]
-    };
-    Section::new("All trials", "").table(Table::new(head, r.trials.iter().map(row).collect()).on_page_only())
+    let inverted = |t: &GraspTrial| (t.inverted_peak > 0).then(|| format!("{} inverted", t.inverted_peak));
+    let table = Table::of(
+        &r.trials,
+        &[
+            ("Condition", &|t| t.condition.name().to_owned()),
+            ("Design", &|t| t.design.clone()),
+            ("s", &|t| fixed(t.at, 2)),
+            ("Offset (mm)", &|t| fixed(t.offset_mm, 0)),
+            ("Drag (mm)", &|t| t.drag_mm.map_or(String::new(), |d| fixed(d, 0))),
+            ("Held", &|t| yes_or_no(t.held)),
+            ("Lift (mm)", &|t| fixed(t.lift_mm, 1)),
+            ("Slip (mm)", &|t| fixed(t.slip_mm, 2)),
+            ("Snap (mm)", &|t| t.snap_mm.map_or(String::new(), |s| fixed(s, 2))),
+            ("Activation step (mm)", &|t| fixed(t.activation_step_mm, 2)),
+            ("Closing force (N)", &|t| fixed(t.closing_force_n, 2)),
+            ("Gap (mm)", &|t| fixed(t.gap_mm, 1)),
+            ("Pull (N)", &|t| fixed(t.peak_constraint_n, 2)),
+            ("Yielded", &|t| count(t.yielded_substeps)),
+            ("Smallest volume", &|t| fixed(t.min_volume_ratio, 2)),
+            ("Suspensions", &|t| suspensions(t.suspensions)),
+            ("Remarks", &|t| remarks(t.divergence.as_ref(), t.why.as_ref(), (t.slipped, t.torn), inverted(t))),
+        ],
+    );
+    Section::new("All trials", "").table(table.on_page_only())
 }
 
 #[cfg(test)]

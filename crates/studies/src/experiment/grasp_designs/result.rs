@@ -172,10 +172,6 @@ pub struct GraspDesignsResult {
     pub tets: usize,
     /// Trials of an earlier run.
     pub resumed: Resumed,
-    /// Wall time (s).
-    pub seconds: f64,
-    /// Path of the page.
-    pub report: String,
 }
 
 /// One row per design; those of the second grasp are last.
@@ -274,8 +270,6 @@ pub(crate) mod tests {
             nodes: 1,
             tets: 1,
             resumed: Resumed::default(),
-            seconds: 1.0,
-            report: String::new(),
         }
     }
 

@@ -83,10 +83,6 @@ pub struct IntegratorsResult {
     pub undamped: bool,
     /// Worker threads.
     pub threads: usize,
-    /// Wall time (s).
-    pub seconds: f64,
-    /// Path of the report.
-    pub report: String,
 }
 
 impl Study for IntegratorsExperiment {
@@ -126,8 +122,6 @@ impl Study for IntegratorsExperiment {
             sag_mm: 1e3 * truth.sag,
             undamped: self.undamped,
             threads: if self.threads == 0 { rayon::current_num_threads() } else { self.threads },
-            seconds: job.seconds(),
-            report: job.report(),
         };
         let document = document(&result)?;
         Ok((result, document))
@@ -287,40 +281,30 @@ fn cards(result: &IntegratorsResult) -> [Card; 4] {
 }
 
 fn rows(result: &IntegratorsResult) -> Section {
-    let head = [
-        "Integrator",
-        "Settings",
-        "Paper",
-        "Outcome",
-        "Peak (m/s)",
-        "Last (m/s)",
-        "Sag over equilibrium",
-        "Sag error",
-        "Frame (ms)",
-    ];
-    let or_dash = |v: Option<String>| v.unwrap_or_else(|| "\u{2013}".to_owned());
-    let row = |r: &IntegratorRow| {
-        let outcome = match (&r.event, r.ended_at_s) {
-            (Some(event), Some(at)) => format!("{event}, after {} s", fixed(at, 3)),
-            _ => "bounded".to_owned(),
-        };
-        vec![
-            r.name.to_owned(),
-            r.settings.clone(),
-            r.paper.to_owned(),
-            outcome,
-            format!("{:.1e}", r.peak_speed_m_s),
-            format!("{:.1e}", r.last_speed_m_s),
-            or_dash(r.sag_ratio.map(|s| fixed(s, 2))),
-            or_dash(r.sag_error.map(|e| percent(e, 2))),
-            fixed(r.frame_ms, 1),
-        ]
+    let outcome = |r: &IntegratorRow| match (&r.event, r.ended_at_s) {
+        (Some(event), Some(at)) => format!("{event}, after {} s", fixed(at, 3)),
+        _ => "bounded".to_owned(),
     };
+    let or_dash = |v: Option<String>| v.unwrap_or_else(|| "\u{2013}".to_owned());
+    let table = Table::of(
+        &result.integrators,
+        &[
+            ("Integrator", &|r| r.name.to_owned()),
+            ("Settings", &|r| r.settings.clone()),
+            ("Paper", &|r| r.paper.to_owned()),
+            ("Outcome", &|r| outcome(r)),
+            ("Peak (m/s)", &|r| format!("{:.1e}", r.peak_speed_m_s)),
+            ("Last (m/s)", &|r| format!("{:.1e}", r.last_speed_m_s)),
+            ("Sag over equilibrium", &|r| or_dash(r.sag_ratio.map(|s| fixed(s, 2)))),
+            ("Sag error", &|r| or_dash(r.sag_error.map(|e| percent(e, 2)))),
+            ("Frame (ms)", &|r| fixed(r.frame_ms, 1)),
+        ],
+    );
     let lead = format!(
         "<i>Sag error</i>: mean distance of the nodes from the static equilibrium (Newton\u{2019}s method in double \
          precision) over their mean displacement in it, positions averaged over the last third of the run. Frames on \
          {} threads.",
         result.threads
     );
-    Section::new("All integrators", lead).table(Table::new(head, result.integrators.iter().map(row).collect()))
+    Section::new("All integrators", lead).table(table)
 }

@@ -54,8 +54,7 @@ impl Study for PortBudgetExperiment {
     fn run(&self, job: &Job<'_>) -> Result<(PortBudgetResult, Document)> {
         let pushing = self.pushing()?;
         job.claim()?;
-        let measured = self.measure(&pushing, job.progress)?;
-        let result = PortBudgetResult { report: job.report(), seconds: job.seconds(), ..measured };
+        let result = self.measure(&pushing, job.progress)?;
         let document = page::document(&result)?;
         Ok((result, document))
     }
@@ -108,8 +107,6 @@ impl PortBudgetExperiment {
             limit_deg: port.tilt_with_clearance(radius, 0.0).map(f64::to_degrees),
             measured_limit_deg: pushing.limit().map(f64::to_degrees),
             paper_limit_deg: PAPER_LIMIT,
-            seconds: 0.0,
-            report: String::new(),
         })
     }
 }

@@ -95,8 +95,7 @@ impl Study for SimilarityExperiment {
         }
         let (rows, shown): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
         let (oblique, seen_obliquely): (Vec<_>, Vec<_>) = oblique.into_iter().unzip();
-        let result =
-            SimilarityResult { rows, oblique, skipped, paper: PAPER, seconds: job.seconds(), report: job.report() };
+        let result = SimilarityResult { rows, oblique, skipped, paper: PAPER };
         let document = page::document(&result, &shown, &seen_obliquely)?;
         Ok((result, document))
     }

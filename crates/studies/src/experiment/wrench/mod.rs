@@ -76,8 +76,7 @@ impl Study for WrenchExperiment {
         }
         let first = self.weigh(0, self.tilt)?;
         job.claim()?;
-        let measured = self.measure(&first, job.progress)?;
-        let result = WrenchResult { report: job.report(), seconds: job.seconds(), ..measured };
+        let result = self.measure(&first, job.progress)?;
         let document = page::document(&result)?;
         Ok((result, document))
     }
@@ -158,8 +157,6 @@ impl WrenchExperiment {
             untared_error_mn: error(&|f| f.untared_mn),
             seen_from_mn: ramp.get(hidden.map_or(0, |k| k + 1)).map(|f| f.truth_mn),
             ramp,
-            seconds: 0.0,
-            report: String::new(),
         })
     }
 
