@@ -50,9 +50,6 @@ pub(crate) fn interpreter(preferred: Option<&str>) -> String {
 }
 
 /// Starts the servers of all Python policies among `policies`, by the policies' names.
-///
-/// # Errors
-/// The first policy that cannot be loaded; [`Error::Interrupted`].
 pub(crate) fn start_servers(
     policies: &[&PolicySpec],
     progress: &dyn Progress,

@@ -203,9 +203,6 @@ impl RemotePolicy {
 
 /// The endpoint of the policy `spec`, with key and timeout of the environment. A Python callable
 /// has no address before it is served.
-///
-/// # Errors
-/// An address, a key or a timeout that is invalid.
 pub(super) fn endpoint(spec: &PolicySpec) -> Result<Endpoint> {
     let is_python = spec.source.starts_with(PYTHON_SOURCE);
     let mut endpoint = Endpoint::new(if is_python { "ws://127.0.0.1:1" } else { &spec.source });

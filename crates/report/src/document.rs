@@ -62,9 +62,9 @@ impl Table {
         Self { only_page: true, ..self }
     }
 
-    fn html(&self) -> String {
-        let head: Vec<&str> = self.head.iter().map(String::as_str).collect();
-        table::plain(&head, &self.rows)
+    /// The HTML for a page.
+    pub fn html(&self) -> String {
+        table::plain(&self.head, &self.rows)
     }
 
     /// Lines for a terminal in aligned columns: the first left, the others right.
@@ -147,7 +147,7 @@ impl Section {
     /// # Errors
     /// A picture whose number of pixels differs from its size.
     pub fn picture(self, picture: &ColorImage, alt: &str, caption: &str) -> Result<Self> {
-        Ok(self.figure(Columns::Two, page::figure(&figures::img(picture, alt)?, caption)))
+        Ok(self.figure(Columns::Two, figures::figure(picture, alt, caption)?))
     }
 
     /// A figure (HTML) in a grid of `columns`.

@@ -10,25 +10,16 @@ use trocar_specimen::Specimen;
 use trocar_workflow::phantoms;
 
 /// Parses a length in millimetres; returns metres.
-///
-/// # Errors
-/// A text that is not a number.
 pub(crate) fn millimetres(text: &str) -> std::result::Result<f64, std::num::ParseFloatError> {
     text.parse::<f64>().map(|mm| 1e-3 * mm)
 }
 
 /// Parses a pressure in kilopascals; returns pascals.
-///
-/// # Errors
-/// A text that is not a number.
 pub(crate) fn kilopascals(text: &str) -> std::result::Result<f64, std::num::ParseFloatError> {
     text.parse::<f64>().map(|kpa| 1e3 * kpa)
 }
 
 /// Parses an angle in degrees; returns radians.
-///
-/// # Errors
-/// A text that is not a number.
 pub(crate) fn degrees(text: &str) -> std::result::Result<f64, std::num::ParseFloatError> {
     text.parse::<f64>().map(f64::to_radians)
 }
@@ -191,9 +182,6 @@ pub struct AppendixChoice {
 
 impl AppendixChoice {
     /// The specimen and its folder. A phantom is recorded and reconstructed in the folder `output`.
-    ///
-    /// # Errors
-    /// A specimen that cannot be read, or a phantom that cannot be made.
     pub(crate) fn read(&self, output: &Path, progress: &dyn Progress) -> Result<(Specimen, PathBuf)> {
         if let Some(folder) = &self.specimen {
             return Ok((Specimen::read(folder)?, folder.clone()));

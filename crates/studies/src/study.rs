@@ -55,14 +55,6 @@ pub trait Study: Args {
     fn run(&self, job: &Job<'_>) -> Result<(Self::Figures, Document)>;
 }
 
-/// Stops an interrupted study.
-///
-/// # Errors
-/// [`Error::Interrupted`] if the user asked to stop.
-pub(crate) fn check_interrupted(progress: &dyn Progress) -> Result<()> {
-    if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
-}
-
 /// One run of a study: output folder, progress.
 pub struct Job<'a> {
     output: PathBuf,
@@ -112,9 +104,6 @@ impl<'a> Job<'a> {
     /// Runs the trials that no earlier run in the output folder has finished, on `threads` threads
     /// (0: all). `key` names a trial uniquely; `settings` is everything else that its row depends
     /// on. The folder must exist. See [`crate::trials`].
-    ///
-    /// # Errors
-    /// The first error of a trial, an interruption, an unwritable file, two trials with one name.
     pub(crate) fn trials<T: Sync, R: Serialize + DeserializeOwned + Send>(
         &self,
         stage: &str,
@@ -146,11 +135,7 @@ pub struct Outcome<F> {
 ///
 /// # Errors
 /// Those of the study; an unwritable file.
-pub fn run<S: Study>(
-    study: &S,
-    output: &Path,
-    progress: &dyn Progress,
-) -> Result<(Outcome<S::Figures>, Document)> {
+pub fn run<S: Study>(study: &S, output: &Path, progress: &dyn Progress) -> Result<(Outcome<S::Figures>, Document)> {
     let (job, clock) = (Job::new::<S>(output, progress), Instant::now());
     let (figures, document) = study.run(&job)?;
     let mut outcome = Outcome { figures, seconds: None, report: None };

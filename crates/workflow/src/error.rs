@@ -1,6 +1,7 @@
 //! Errors of the commands.
 
 use std::path::PathBuf;
+use trocar_core::Progress;
 
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -107,6 +108,14 @@ pub enum Error {
     /// A cell cannot be built or stepped.
     #[error(transparent)]
     Cell(trocar_cell::Error),
+}
+
+/// Stops interrupted work.
+///
+/// # Errors
+/// [`Error::Interrupted`] if the user asked to stop.
+pub fn check_interrupted(progress: &dyn Progress) -> Result<()> {
+    if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
 }
 
 /// Keeps interruptions apart from other errors.

@@ -1,7 +1,7 @@
 //! The commands' work from folder to folder: read, run, write the result and its report.
 
 use crate::truth::{Truth, TruthFigures};
-use crate::{Error, Result, pages};
+use crate::{Error, Result, check_interrupted, pages};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
@@ -141,17 +141,12 @@ pub fn reconstruct_surface(
 }
 
 fn finish(staged: StagedFolder, specimen: &Specimen, html: &str, progress: &dyn Progress) -> Result<()> {
-    stop_if_asked(progress)?;
+    // Making a report does not check for interruption.
+    check_interrupted(progress)?;
     specimen.write_into(staged.path())?;
     let path = staged.path().join(REPORT);
     std::fs::write(&path, html).map_err(|source| Error::Io { path, source })?;
     Ok(staged.commit()?)
-}
-
-/// Making a report does not check for interruption, so a request to stop is honoured before
-/// anything is put in place.
-fn stop_if_asked(progress: &dyn Progress) -> Result<()> {
-    if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
 }
 
 /// Refuses an output that is, contains or is inside the input, which would be replaced or changed.

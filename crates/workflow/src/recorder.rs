@@ -52,15 +52,12 @@ impl Recorder {
     pub fn new(rig: CameraRig) -> Self {
         let name = |wanted: &str| rig.cameras().iter().find(|c| **c == wanted).map(|c| (*c).to_owned());
         let camera = name("endoscope").or_else(|| rig.cameras().first().map(|c| (*c).to_owned()));
-        let depth = name("d405");
-        let (stills, frames) = (Vec::new(), Vec::new());
-        let camera = camera.unwrap_or_default();
         Self {
+            camera: camera.unwrap_or_default(),
+            depth: name("d405"),
             rig,
-            camera,
-            depth,
-            stills,
-            frames,
+            stills: Vec::new(),
+            frames: Vec::new(),
             records_video: true,
             lifted: false,
             spent: Duration::ZERO,

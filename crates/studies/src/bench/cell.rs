@@ -8,7 +8,7 @@ use super::machine::Machine;
 use crate::Result;
 use crate::names::SceneChoice;
 use crate::statistics::median;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -19,8 +19,8 @@ use trocar_scene::Scene;
 use trocar_specimen::Specimen;
 use trocar_task::policy::{Script, Scripted};
 use trocar_task::{Episode, Policy, SETTLE_S};
-use trocar_workflow::scene_specimen;
 use trocar_workflow::specimen_scene::{grasp_lift, task_organ};
+use trocar_workflow::{check_interrupted, scene_specimen};
 
 /// Swing of the right arm: amplitude of the pivots (rad), frequency (Hz).
 const SWING: (f64, f64) = (0.1, 0.5);

@@ -6,7 +6,7 @@
 use super::machine::Machine;
 use crate::names::SceneChoice;
 use crate::statistics::median;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
@@ -18,7 +18,7 @@ use trocar_report::table::{count, fixed};
 use trocar_scene::Scene;
 use trocar_sensors::CameraRig;
 use trocar_task::{Episode, Policy, policy};
-use trocar_workflow::scene_specimen;
+use trocar_workflow::{check_interrupted, scene_specimen};
 
 /// Number of timed path-traced frames.
 const PATH_FRAMES: usize = 10;

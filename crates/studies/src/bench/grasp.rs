@@ -9,7 +9,7 @@
 use super::machine::Machine;
 use crate::names::{AppendixChoice, DesignName, design_name};
 use crate::statistics::median;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
@@ -19,8 +19,8 @@ use trocar_report::document::{Document, Section, Table};
 use trocar_report::table::{count, fixed, percent};
 use trocar_task::policy::Scripted;
 use trocar_task::{Episode, Policy, SETTLE_S};
-use trocar_workflow::Lift;
 use trocar_workflow::specimen_scene::{free_scene, task_organ};
+use trocar_workflow::{Lift, check_interrupted};
 
 /// The timed phases: those with the jaws near the tissue.
 const PHASES: [&str; 6] = ["enter", "close", "lift", "hold", "lower", "open"];

@@ -2,12 +2,11 @@
 
 use crate::scenes::{self, Organs, Run, Scene, material};
 use crate::statistics::median;
-use crate::study::check_interrupted;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::time::Instant;
 use trocar_core::Progress;
-use trocar_workflow::{SOLVERS, solver_named};
+use trocar_workflow::{SOLVERS, check_interrupted, solver_named};
 
 /// Warm-up frames, and maximum number of timed frames.
 const WARM_UP: usize = 3;

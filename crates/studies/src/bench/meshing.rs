@@ -5,7 +5,7 @@ use super::pytetwild::PytetwildMesher;
 use crate::Result;
 use crate::names::Units;
 use crate::scenes::ellipsoid;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -16,6 +16,7 @@ use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
+use trocar_workflow::check_interrupted;
 
 /// Half axes of the default body (m): an ellipsoid of 815 cm3, the volume of the paper's liver.
 const LIVER: [f64; 3] = [0.105, 0.064, 0.029];

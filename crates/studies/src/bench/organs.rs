@@ -4,7 +4,7 @@ use super::machine::Machine;
 use super::timing::Timing;
 use crate::names::{SolverName, kilopascals};
 use crate::scenes::{FRAME, OracleRun, Organs, Run, Scene, material, mean_error, rest_positions, rms_error};
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
@@ -13,7 +13,7 @@ use trocar_core::Progress;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::table::{count, fixed, percent};
 use trocar_tissue::Material;
-use trocar_workflow::solver_named;
+use trocar_workflow::{check_interrupted, solver_named};
 
 /// Frames of the tube scene at which the error is measured.
 const TUBE_FRAMES: [usize; 3] = [15, 30, 60];

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::names::SceneChoice;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use crate::trials::{Outcomes, Resumed, resumed};
 use clap::Args;
 use serde::{Deserialize, Serialize};
@@ -15,7 +15,7 @@ use trocar_scene::{Scene, TaskName};
 use trocar_specimen::Specimen;
 use trocar_task::policy::RandomActions;
 use trocar_task::{ArmChannels, End, Episode, Policy};
-use trocar_workflow::scene_specimen;
+use trocar_workflow::{check_interrupted, scene_specimen};
 
 /// Threshold of the RCM deviation (mm). With that of the scene the episode would end early.
 const RCM_THRESHOLD_MM: f64 = 25.0;

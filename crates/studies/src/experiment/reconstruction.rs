@@ -283,8 +283,8 @@ fn errors(made: &[Reconstruction]) -> Result<Section> {
         for organ in &r.organs {
             overlays::error(&mut picture, &organ.depth_error, &organ.compared);
         }
-        let img = figures::img(&picture, "signed depth error of all organs")?;
-        shown.push(page::figure(&img, &format!("<b>{}.</b>", page::escape(&r.specimen.name))));
+        let caption = format!("<b>{}.</b>", page::escape(&r.specimen.name));
+        shown.push(figures::figure(&picture, "signed depth error of all organs", &caption)?);
     }
     let bar = page::scale_bar(&colors::DIVERGING, "\u{2212}5", "surface minus measured depth (mm)", "+5");
     let lead = "Blue: the surface is nearer to the camera than the measured depth; red: farther.";
@@ -319,14 +319,14 @@ fn pictures(made: &[Reconstruction]) -> Result<Section> {
     for r in made {
         let Some(camera) = &r.specimen.camera else { continue };
         let name = page::escape(&r.specimen.name);
-        let input = figures::img(&r.input, "input frame")?;
-        shown.push(page::figure(&input, &format!("<b>{name}.</b> The centre frame of the window.")));
+        let caption = format!("<b>{name}.</b> The centre frame of the window.");
+        shown.push(figures::figure(&r.input, "input frame", &caption)?);
         let scene =
             PhongScene::new(trocar_workflow::pages::organ_views::surfaces(&r.specimen), None, colors::VIEW_GROUND)
                 .with_ambient_occlusion(24, 0.012);
         let rendered = scene.render(camera, &Pose::IDENTITY, 2).color;
-        let rendered = figures::img(&rendered, "reconstructed surfaces through the recording camera")?;
-        shown.push(page::figure(&rendered, "<b>Reconstructed.</b> The surfaces through the recording camera."));
+        let caption = "<b>Reconstructed.</b> The surfaces through the recording camera.";
+        shown.push(figures::figure(&rendered, "reconstructed surfaces through the recording camera", caption)?);
     }
     Ok(Section::new("Pictures", "").figures(shown))
 }

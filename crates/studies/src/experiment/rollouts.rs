@@ -11,7 +11,7 @@ use trocar_campaign::{
 };
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
-use trocar_report::table::{count, fixed};
+use trocar_report::table::{count, fixed, or_dash};
 use trocar_scene::{Split, VariationSet};
 use trocar_task::policy::POLICIES;
 
@@ -210,10 +210,6 @@ fn document(manifest: &Manifest, r: &RolloutsResult, records: &[EpisodeRecord]) 
     let by_controller = Section::new("Controllers", "").table(controllers(&r.by_policy));
     let subtitle = "Lift and RCM deviation of six controllers, beside the paper's Fig. 6(d, e)";
     Ok(Document::new("Rollouts", subtitle).with(outcome).with(spread).with(by_controller))
-}
-
-fn or_dash(value: Option<f64>, decimals: usize) -> String {
-    value.map_or("\u{2013}".to_owned(), |v| fixed(v, decimals))
 }
 
 fn beside_paper(r: &RolloutsResult) -> Table {

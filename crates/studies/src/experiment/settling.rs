@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::names::{Recorded, SolverName, phantoms_or_all};
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use clap::Args;
 use serde::Serialize;
 use trocar_cell::{FRAME, World};
@@ -12,8 +12,8 @@ use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
-use trocar_workflow::phantoms;
 use trocar_workflow::solver_named;
+use trocar_workflow::{check_interrupted, phantoms};
 
 /// Target: every specimen is below this speed (m/s)
 const SETTLED_SPEED: f64 = 0.01;
@@ -114,10 +114,7 @@ impl Study for SettlingExperiment {
                 phantoms::specimen(phantom, &self.recorded.options(), &job.output().join(phantom), job.progress)?;
             rows.push(released(phantom, World::new(&specimen, schedule, self.threads)?, job.progress)?);
         }
-        let result = SettlingResult {
-            phantoms: rows,
-            schedule: self.schedule.name().to_owned(),
-        };
+        let result = SettlingResult { phantoms: rows, schedule: self.schedule.name().to_owned() };
         let document = document(&result)?;
         Ok((result, document))
     }
@@ -219,9 +216,8 @@ fn document(result: &SettlingResult) -> Result<Document> {
 }
 
 fn beside_paper(result: &SettlingResult) -> Section {
-    let settled = |p: &SettlingRow| {
-        p.settled_after_s.map_or("not within 1.5 s".to_owned(), |s| format!("{} s", fixed(s, 2)))
-    };
+    let settled =
+        |p: &SettlingRow| p.settled_after_s.map_or("not within 1.5 s".to_owned(), |s| format!("{} s", fixed(s, 2)));
     let table = Table::of(
         &result.phantoms,
         &[

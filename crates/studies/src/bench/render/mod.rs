@@ -9,7 +9,7 @@ use super::machine::Machine;
 use crate::Result;
 use crate::scenes::{LaparoscopicScene, endoscope_view};
 use crate::statistics::median;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -24,8 +24,8 @@ use trocar_report::document::{Document, Section, Table};
 use trocar_report::table::{count, fixed};
 use trocar_scene::Scene;
 use trocar_sensors::CameraRig;
-use trocar_workflow::ScriptedLift;
 use trocar_workflow::scene_specimen;
+use trocar_workflow::{ScriptedLift, check_interrupted};
 
 /// Index of the organ that deforms.
 const MOVING: usize = 1;

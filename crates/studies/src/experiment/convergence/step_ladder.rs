@@ -3,14 +3,13 @@
 
 use crate::Result;
 use crate::scenes::{FRAME, OracleRun, Scene, grasps, rest_positions, tools};
-use crate::study::check_interrupted;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use trocar_core::Progress;
 use trocar_tissue::{Descent, QuasiNewton, SolverSettings, State, Stepper, ToolMotion};
 use trocar_tissue_reference::OracleState;
-use trocar_workflow::solver_named;
+use trocar_workflow::{check_interrupted, solver_named};
 
 /// Oracle steps per frame before the measured substep.
 const ORACLE_SUBSTEPS: usize = 4;
@@ -61,9 +60,6 @@ fn frames_before(scene: &str) -> Option<usize> {
 }
 
 /// Measures all rows of a scene.
-///
-/// # Errors
-/// An oracle that does not converge, an interruption.
 pub(super) fn measure(scene: &Scene, solvers: &[&str], max: usize, progress: &dyn Progress) -> Result<Vec<StepRow>> {
     let mut run = OracleRun::new(scene);
     let h = FRAME / ORACLE_SUBSTEPS as f64;

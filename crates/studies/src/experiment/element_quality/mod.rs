@@ -88,13 +88,7 @@ impl Study for ElementQualityExperiment {
         let settings = format!("{} N, {}", self.jaw_force, whole.fingerprint());
         let Outcomes { rows, resumed } = job.trials("cases", &settings, &cases, Case::key, self.threads, Case::run)?;
         let (nodes, tets) = whole.size();
-        let result = ElementQualityResult {
-            rows,
-            jaw_force_n: self.jaw_force,
-            nodes,
-            tets,
-            resumed,
-        };
+        let result = ElementQualityResult { rows, jaw_force_n: self.jaw_force, nodes, tets, resumed };
         let document = page::document(&result)?;
         Ok((result, document))
     }
@@ -198,13 +192,7 @@ mod tests {
                 }));
             }
         }
-        ElementQualityResult {
-            rows,
-            jaw_force_n: 1.0,
-            nodes: 1,
-            tets: 1,
-            resumed: Resumed::default(),
-        }
+        ElementQualityResult { rows, jaw_force_n: 1.0, nodes: 1, tets: 1, resumed: Resumed::default() }
     }
 
     #[test]

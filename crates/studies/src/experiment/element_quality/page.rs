@@ -8,7 +8,7 @@ use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
-use trocar_report::table::{count, fixed, yes_or_no};
+use trocar_report::table::{count, fixed, or_dash, yes_or_no};
 
 pub(super) fn document(r: &ElementQualityResult) -> Result<Document> {
     // Groups of cases: condition, and whether the jaw force is proportional to the modulus.
@@ -96,7 +96,6 @@ fn volumes(rows: &[&ElementQualityRow], pins: &str) -> Result<String> {
 }
 
 fn table(rows: &[&ElementQualityRow]) -> Table {
-    let or_dash = |value: Option<f64>, decimals: usize| fixed(value.unwrap_or(f64::NAN), decimals);
     Table::of(
         rows,
         &[

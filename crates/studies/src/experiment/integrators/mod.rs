@@ -6,7 +6,7 @@ mod row;
 
 use crate::names::Recorded;
 use crate::scenes::{FRAME, Organs, Scene, material, mean_error, rest_positions};
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
 use forms::{Form, findings, forms};
@@ -24,7 +24,7 @@ use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
 use trocar_tissue::{Model, SolverSettings, State};
 use trocar_tissue_reference::{Oracle, OracleState, stable_explicit_step};
-use trocar_workflow::phantoms;
+use trocar_workflow::{check_interrupted, phantoms};
 
 /// Node speed that counts as divergence (m/s): the limit of the paper.
 const SPEED_LIMIT: f64 = 20.0;

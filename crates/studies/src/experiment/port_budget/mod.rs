@@ -7,12 +7,13 @@ mod result;
 
 use crate::Result;
 use crate::names::millimetres;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use clap::Args;
 use pushing::{DIRECTIONS, Pushing};
 use result::{PortBudgetResult, PortRoom, PortStart};
 use trocar_core::Progress;
 use trocar_report::document::Document;
+use trocar_workflow::check_interrupted;
 
 /// Largest tilt of the table (degrees).
 const MAX_TILT: f64 = 35.0;

@@ -7,7 +7,7 @@ use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
-use trocar_report::table::fixed;
+use trocar_report::table::{fixed, or_dash};
 
 /// The tables show every fifth row; the JSON has all.
 const EVERY: usize = 5;
@@ -179,14 +179,10 @@ fn starts(r: &PortBudgetResult) -> Section {
             ("Tilt (\u{b0})", &|s| fixed(s.tilt_deg, 1)),
             ("Paper (mm)", &|s| fixed(s.paper_mm, 2)),
             ("Formula (mm)", &|s| fixed(s.clearance_mm, 4)),
-            ("Measured (mm)", &|s| number(s.measured_mm)),
+            ("Measured (mm)", &|s| or_dash(s.measured_mm, 4)),
         ],
     );
     Section::new("Beside the paper", "").table(table)
-}
-
-fn number(value: Option<f64>) -> String {
-    fixed(value.unwrap_or(f64::NAN), 4)
 }
 
 fn rows(r: &PortBudgetResult) -> Section {
@@ -195,10 +191,10 @@ fn rows(r: &PortBudgetResult) -> Section {
         &[
             ("Tilt (\u{b0})", &|row| fixed(row.tilt_deg, 1)),
             ("Formula (mm)", &|row| fixed(row.clearance_mm, 4)),
-            ("Measured, along the tilt (mm)", &|row| number(row.measured_mm)),
-            ("opposite (mm)", &|row| number(row.measured_against_mm)),
-            ("across (mm)", &|row| number(row.measured_across_mm)),
-            ("Smallest in any direction (mm)", &|row| number(row.measured_least_mm)),
+            ("Measured, along the tilt (mm)", &|row| or_dash(row.measured_mm, 4)),
+            ("opposite (mm)", &|row| or_dash(row.measured_against_mm, 4)),
+            ("across (mm)", &|row| or_dash(row.measured_across_mm, 4)),
+            ("Smallest in any direction (mm)", &|row| or_dash(row.measured_least_mm, 4)),
             ("Pushed (mm)", &|row| fixed(row.pushed_mm, 4)),
             ("1 mm sheet (mm)", &|row| fixed(row.thicker_mm[0], 4)),
             ("2 mm sheet (mm)", &|row| fixed(row.thicker_mm[1], 4)),

@@ -44,10 +44,6 @@ impl Condition {
 }
 
 /// The conditions: the scene as it is written, each factor at each of its values, and all together.
-///
-/// # Errors
-/// A name that is unknown or of something that the set does not vary; a value that does not suit
-/// the scene.
 pub(super) fn conditions(scene: &Scene, own: &RobustnessExperiment) -> Result<Vec<Condition>> {
     let mut varied = scene.clone();
     varied.variation.set = own.variation;

@@ -17,7 +17,7 @@ pub use result::SimilarityResult;
 
 use crate::Result;
 use crate::names::{Recorded, phantoms_or_all};
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use clap::Args;
 use measure::{Sides, SimilarityPictures, first_frames, labelled, measure};
 use result::PAPER;
@@ -28,7 +28,7 @@ use trocar_core::Progress;
 use trocar_reconstruct::{Reconstruction, Settings};
 use trocar_report::document::Document;
 use trocar_workflow::phantoms::recorded;
-use trocar_workflow::reconstruct_recording;
+use trocar_workflow::{check_interrupted, reconstruct_recording};
 
 /// Silhouettes, SSIM and PSNR of rendered reconstructions against the recordings, and oblique views
 /// through the endoscope.

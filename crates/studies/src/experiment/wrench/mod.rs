@@ -7,7 +7,7 @@ mod result;
 
 use crate::Result;
 use crate::names::degrees;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use clap::Args;
 use glam::{DQuat, DVec3};
 use normal::normals;
@@ -18,6 +18,7 @@ use trocar_robot::instrument::{GRAVITY, Instrument};
 use trocar_robot::wrench::{
     Compensator, ForceKind, Identification, LoadModel, SensorNoise, StaticReading, identify, static_orientations,
 };
+use trocar_workflow::check_interrupted;
 
 /// The paper's weight of an instrument (N).
 const PAPER_WEIGHT: f64 = 4.7;
