@@ -96,7 +96,6 @@ fn body(manifest: &Manifest, r: &CampaignResult, records: &[EpisodeRecord], stor
     .concat())
 }
 
-/// A sentence from words.
 fn sentence(words: &str) -> String {
     let mut letters = words.chars();
     letters.next().map_or_else(String::new, |first| format!("{}{}.", first.to_uppercase(), letters.as_str()))

@@ -14,6 +14,7 @@ use trocar_recording::{Packet, Recording, RgbdFrame};
 use xxhash_rust::xxh3::Xxh3;
 
 /// The scene behind the instruments, from a window of frames.
+#[derive(Clone, Debug)]
 pub struct Composite {
     /// The centre frame's colour.
     pub input: ColorImage,

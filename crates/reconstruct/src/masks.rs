@@ -14,7 +14,6 @@ pub struct OrganSegmenters {
     sam: Option<Sam2>,
 }
 
-/// The segmentation target of an organ.
 fn target(organ: &OrganInfo) -> Target {
     Target {
         name: organ.name.clone(),

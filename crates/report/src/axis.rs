@@ -112,7 +112,6 @@ pub fn log_label(exponent: f64) -> String {
     if multiple == 1.0 { power } else { format!("{multiple}\u{b7}{power}") }
 }
 
-/// A whole power of ten.
 fn power_of_ten(exponent: f64) -> String {
     let digit = |c: char| match c {
         '-' => '\u{207b}',

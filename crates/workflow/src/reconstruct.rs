@@ -72,15 +72,15 @@ impl CompositeFigures {
     /// # Errors
     /// Names the file of the truth that is unreadable or of another size.
     pub fn of(r: &Reconstruction, recording: &Path) -> Result<Self> {
-        let truth = Truth::read(r, &recording.join("truth"))?;
+        let (truth, c) = (Truth::read(r, &recording.join("truth"))?, &r.composite);
         Ok(Self {
-            frames_used: r.frames_used,
-            recovered_share: r.recovered_share,
-            coverage: r.coverage,
-            depth_range_median_mm: r.depth_range_median * 1e3,
-            frames_s: r.times.frames,
-            decoding_cpu_s: r.times.decoding,
-            medians_s: r.times.medians,
+            frames_used: c.frames_used,
+            recovered_share: c.recovered_share,
+            coverage: c.coverage,
+            depth_range_median_mm: c.depth_range_median * 1e3,
+            frames_s: c.times.frames,
+            decoding_cpu_s: c.times.decoding,
+            medians_s: c.times.medians,
             truth: truth.and_then(|truth| truth.figures(r)),
         })
     }

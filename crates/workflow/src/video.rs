@@ -105,7 +105,6 @@ impl VideoWriter {
     }
 }
 
-/// Path of the partial file.
 fn partial_path(output: &Path) -> PathBuf {
     let name = output.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     output.with_file_name(format!(".{}-{name}", std::process::id()))

@@ -119,7 +119,6 @@ fn text(made: &EpisodeOutput) -> String {
     )
 }
 
-/// One line on an arm.
 fn arm(a: &ArmSummary) -> String {
     let lag = a.lag_ms.map_or("lag not measured".to_owned(), |lag| format!("lag {lag:.0} ms"));
     format!(

@@ -108,7 +108,6 @@ pub fn text(r: &LiftResult) -> String {
     )
 }
 
-/// A cut as text.
 fn cut(s: &Severed) -> String {
     let c = &s.cut;
     if c.pieces.is_empty() {

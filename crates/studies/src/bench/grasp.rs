@@ -6,7 +6,7 @@
 //! the end of the frame. The tissue moves alike, so the difference is contact alone: detection,
 //! forces, and the iterations that its stiffness costs.
 
-use super::machine::Machine;
+use super::machine::{Machine, Setup};
 use crate::names::{AppendixChoice, DesignName, design_name};
 use crate::statistics::median;
 use crate::study::{Job, Kind, Study};
@@ -16,7 +16,7 @@ use serde::Serialize;
 use trocar_cell::{Cell, ContactParts, FRAME, Timing};
 use trocar_core::Progress;
 use trocar_report::document::{Document, Section, Table};
-use trocar_report::table::{count, fixed, percent};
+use trocar_report::table::{fixed, percent};
 use trocar_task::policy::Scripted;
 use trocar_task::{Episode, Policy, SETTLE_S};
 use trocar_workflow::specimen_scene::{free_scene, task_organ};
@@ -94,21 +94,13 @@ pub struct GraspBenchResult {
     pub design: &'static str,
     /// Whether the lift with contact held.
     pub held: bool,
-    /// Number of organs.
-    pub organs: usize,
-    /// Number of nodes.
-    pub nodes: usize,
-    /// Number of elements.
-    pub tets: usize,
     /// Repetitions.
     pub repeats: usize,
-    /// Worker threads.
-    pub threads: usize,
-    /// The machine.
-    pub machine: Machine,
+    /// What was stepped, and on what.
+    #[serde(flatten)]
+    pub setup: Setup,
 }
 
-/// One frame of each run.
 struct Frames {
     phase: &'static str,
     with: Frame,
@@ -118,12 +110,10 @@ struct Frames {
     without: Frame,
 }
 
-/// One frame of one run.
 #[derive(Clone, Copy)]
 struct Frame {
     /// Wall time of the tissue (s).
     seconds: f64,
-    /// Solver iterations.
     iterations: usize,
 }
 
@@ -170,8 +160,6 @@ impl Study for GraspBench {
             progress.end();
             held = with.summary().held;
         }
-        let bodies = with.cell().world().model.bodies();
-        let size = (bodies.iter().map(|b| b.len()).sum(), bodies.iter().map(|b| b.tets().len()).sum());
         let all = timing("all", &times);
         let result = GraspBenchResult {
             real_time_factor: 1e3 * FRAME / all.with_contact_ms,
@@ -181,12 +169,8 @@ impl Study for GraspBench {
             phases: std::iter::once(all).chain(PHASES.map(|phase| timing(phase, &times))).collect(),
             design: design_name(design),
             held,
-            organs: specimen.organs.len(),
-            nodes: size.0,
-            tets: size.1,
             repeats: self.repeats,
-            threads: if self.threads == 0 { machine.cores } else { self.threads },
-            machine,
+            setup: Setup::new(&with.cell().world().model, self.threads, machine),
         };
         let document = document(&result);
         Ok((result, document))
@@ -256,7 +240,6 @@ fn timing(phase: &'static str, frames: &[Frames]) -> GraspPhaseTiming {
     }
 }
 
-/// Frames of one run.
 struct Run(Vec<Frame>);
 
 impl Run {
@@ -298,16 +281,12 @@ fn document(r: &GraspBenchResult) -> Document {
         "Same motion: each frame again without contact but with its forces. No contact: without contact and its forces."
             .to_owned(),
         format!(
-            "{}x real time with contact, {}x without; {} grasp, {}; {} organs, {} nodes, {} tets; {} threads on {}",
+            "{}x real time with contact, {}x without; {} grasp, {}; {}",
             fixed(r.real_time_factor, 2),
             fixed(r.real_time_factor_without_contact, 2),
             r.design,
             if r.held { "held" } else { "NOT held" },
-            r.organs,
-            count(r.nodes),
-            count(r.tets),
-            r.threads,
-            r.machine.described()
+            r.setup.described()
         ),
     ];
     Document::new("Grasp", "Cost of contact with the gripper")

@@ -279,7 +279,7 @@ fn table_i_beside_paper(result: &ReconstructionResult) -> Section {
 fn errors(made: &[Reconstruction]) -> Result<Section> {
     let mut shown = Vec::new();
     for r in made {
-        let mut picture = overlays::dimmed(&r.background);
+        let mut picture = overlays::dimmed(&r.composite.color);
         for organ in &r.organs {
             overlays::error(&mut picture, &organ.depth_error, &organ.compared);
         }
@@ -320,7 +320,7 @@ fn pictures(made: &[Reconstruction]) -> Result<Section> {
         let Some(camera) = &r.specimen.camera else { continue };
         let name = page::escape(&r.specimen.name);
         let caption = format!("<b>{name}.</b> The centre frame of the window.");
-        shown.push(figures::figure(&r.input, "input frame", &caption)?);
+        shown.push(figures::figure(&r.composite.input, "input frame", &caption)?);
         let scene =
             PhongScene::new(trocar_workflow::pages::organ_views::surfaces(&r.specimen), None, colors::VIEW_GROUND)
                 .with_ambient_occlusion(24, 0.012);

@@ -7,7 +7,6 @@ use std::path::Path;
 use trocar_geometry::io::read_msh_groups;
 use trocar_geometry::{LatticeMesher, TetMesh};
 
-/// Name of the appendix.
 const APPENDIX: &str = "appendix";
 
 /// Maximum size of an organ (m); a larger one is in another unit.

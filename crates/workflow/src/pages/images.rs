@@ -18,13 +18,17 @@ use trocar_report::{figures, overlays};
 /// # Errors
 /// Names the image of another size.
 pub fn check_sizes(r: &Reconstruction) -> Result<()> {
-    let size = (r.input.width, r.input.height);
+    let size = (r.composite.input.width, r.composite.input.height);
     let pixels = size.0 * size.1;
     let mut images = vec![
-        ("input", (r.input.width, r.input.height), r.input.pixels.len()),
-        ("instrument mask", (r.instruments.width, r.instruments.height), r.instruments.set.len()),
-        ("composite", (r.background.width, r.background.height), r.background.pixels.len()),
-        ("composite depth", (r.depth.width, r.depth.height), r.depth.depth.len()),
+        ("input", (r.composite.input.width, r.composite.input.height), r.composite.input.pixels.len()),
+        (
+            "instrument mask",
+            (r.composite.instruments.width, r.composite.instruments.height),
+            r.composite.instruments.set.len(),
+        ),
+        ("composite", (r.composite.color.width, r.composite.color.height), r.composite.color.pixels.len()),
+        ("composite depth", (r.composite.depth.width, r.composite.depth.height), r.composite.depth.depth.len()),
     ];
     for o in &r.organs {
         images.push((&o.name, (o.mask.width, o.mask.height), o.mask.set.len()));
@@ -50,14 +54,18 @@ pub(super) fn overview(r: &Reconstruction) -> String {
     let errors: Vec<f64> = facts().filter_map(|f| f.depth_error_median_mm).collect();
     let worst = errors.iter().copied().fold(f64::NAN, f64::max);
     let cards = [
-        Card::new("Recovered under instruments", percent(r.recovered_share, 1), "of the image; paper 3.4\u{202f}%"),
-        Card::new("Depth coverage", percent(r.coverage, 1), "of the pixels; paper 90.3\u{202f}%"),
+        Card::new(
+            "Recovered under instruments",
+            percent(r.composite.recovered_share, 1),
+            "of the image; paper 3.4\u{202f}%",
+        ),
+        Card::new("Depth coverage", percent(r.composite.coverage, 1), "of the pixels; paper 90.3\u{202f}%"),
         Card::new(
             "Depth spread",
-            format!("{} mm", fixed(1e3 * r.depth_range_median, 2)),
+            format!("{} mm", fixed(1e3 * r.composite.depth_range_median, 2)),
             "10th to 90th percentile, median pixel; paper 2.0 mm",
         ),
-        Card::new("Frames used", table::count(r.frames_used), "in the composite"),
+        Card::new("Frames used", table::count(r.composite.frames_used), "in the composite"),
         Card::new("Depth error", format!("{} mm", fixed(worst, 2)), "median of the organ that fits worst"),
         judged(Card::new("Watertight", format!("{tight} of {organs}"), "organs"), tight == organs, doubtful),
         judged(Card::new("Inverted elements", table::count(inverted), "over all organs"), inverted == 0, doubtful),
@@ -73,8 +81,8 @@ fn judged(card: Card, met: bool, doubtful: bool) -> Card {
 
 /// Input, composite, masks, and the surfaces through the recording camera.
 pub(super) fn images(r: &Reconstruction) -> Result<String> {
-    let mut input = r.input.clone();
-    overlays::outline(&mut input, &r.instruments, INSTRUMENT);
+    let mut input = r.composite.input.clone();
+    overlays::outline(&mut input, &r.composite.instruments, INSTRUMENT);
     let legend = page::legend([("instruments", INSTRUMENT)]);
     let input = figures::figure(
         &input,
@@ -82,14 +90,14 @@ pub(super) fn images(r: &Reconstruction) -> Result<String> {
         &format!("<b>Input.</b> The recorded frame at the window's centre.{legend}"),
     )?;
     let composite = figures::figure(
-        &r.background,
+        &r.composite.color,
         "composite without instruments",
         &format!(
             "<b>Composite.</b> Per-pixel median of {} frames, instruments removed; pixels that were never visible are empty.",
-            table::count(r.frames_used)
+            table::count(r.composite.frames_used)
         ),
     )?;
-    let mut masked = r.background.clone();
+    let mut masked = r.composite.color.clone();
     for (i, organ) in r.organs.iter().enumerate() {
         overlays::tint(&mut masked, &organ.mask, colors::organ(i), 0.42);
         overlays::outline(&mut masked, &organ.mask, colors::organ(i));
@@ -106,7 +114,7 @@ pub(super) fn images(r: &Reconstruction) -> Result<String> {
             .with_ambient_occlusion(24, 0.012);
         let rendered = scene.render(camera, &Pose::IDENTITY, 2).color;
         let caption = "<b>Composite,</b> for comparison.";
-        top.push(figures::figure(&r.background, "composite, for comparison", caption)?);
+        top.push(figures::figure(&r.composite.color, "composite, for comparison", caption)?);
         top.push(figures::figure(
             &rendered,
             "reconstructed surfaces through the recording camera",
@@ -123,13 +131,17 @@ pub(super) fn images(r: &Reconstruction) -> Result<String> {
 }
 
 fn depth_figure(r: &Reconstruction) -> Result<String> {
-    let valid: Vec<f64> = r.depth.depth.iter().filter(|d| **d > 0.0).map(|d| f64::from(*d)).collect();
+    let valid: Vec<f64> = r.composite.depth.depth.iter().filter(|d| **d > 0.0).map(|d| f64::from(*d)).collect();
     // The ends are percentiles, so that stray depths do not stretch the colour scale.
     let low = quantile(&valid, 0.005).unwrap_or(0.0);
     let high = quantile(&valid, 0.995).unwrap_or(1.0);
     let bar = page::scale_bar(&SEQUENTIAL, &fixed(1e3 * low, 0), "depth (mm)", &fixed(1e3 * high, 0));
     let caption = format!("<b>Composite depth.</b> Distance along the view; black: no depth.{bar}");
-    Ok(figures::figure(&overlays::depth(&r.depth, (low, high)), "composite depth in false colours", &caption)?)
+    Ok(figures::figure(
+        &overlays::depth(&r.composite.depth, (low, high)),
+        "composite depth in false colours",
+        &caption,
+    )?)
 }
 
 /// Depth errors of the surfaces: their distance before or behind the depth they were made from.
@@ -137,7 +149,7 @@ pub(super) fn depth_errors(r: &Reconstruction) -> Result<String> {
     if r.organs.is_empty() {
         return Ok(String::new());
     }
-    let ground = overlays::dimmed(&r.background);
+    let ground = overlays::dimmed(&r.composite.color);
     let mut all = ground.clone();
     for organ in &r.organs {
         overlays::error(&mut all, &organ.depth_error, &organ.compared);

@@ -43,13 +43,13 @@ pub(super) fn section(r: &Reconstruction, dir: &Path) -> Result<String> {
 }
 
 fn error_map(r: &Reconstruction, truth: &DepthImage) -> Result<String> {
-    let mut picture = overlays::dimmed(&r.background);
-    let pairs = || r.depth.depth.iter().zip(&truth.depth);
+    let mut picture = overlays::dimmed(&r.composite.color);
+    let pairs = || r.composite.depth.depth.iter().zip(&truth.depth);
     let compared =
         Mask { width: truth.width, height: truth.height, set: pairs().map(|(a, b)| *a > 0.0 && *b > 0.0).collect() };
     let error: Vec<f32> = pairs().map(|(a, b)| a - b).collect();
     overlays::error(&mut picture, &error, &compared);
-    overlays::outline(&mut picture, &r.instruments, trocar_report::colors::INSTRUMENT);
+    overlays::outline(&mut picture, &r.composite.instruments, trocar_report::colors::INSTRUMENT);
     let bar = page::scale_bar(&DIVERGING, "\u{2212}5", "composite minus true depth (mm)", "+5");
     let caption = "<b>Depth error of the composite.</b> Outlined: the instruments of the centre frame.";
     Ok(figures::figure(&picture, "depth error of the composite", &format!("{caption}{bar}"))?)

@@ -40,7 +40,6 @@ pub struct ControllerGridExperiment {
     pub threads: usize,
 }
 
-/// All configurations.
 fn grid() -> Vec<ControllerSettings> {
     let mut all = Vec::with_capacity(KINDS.len() * BANDWIDTHS.len() * DAMPINGS.len());
     for (law, correction) in KINDS {
@@ -143,7 +142,6 @@ mod tests {
     use crate::trials::Resumed;
     use motion::{ControllerFigures, ControllerInstant};
 
-    /// A made-up result.
     fn made_up_result() -> ControllerGridResult {
         let row = |k: usize, s: &ControllerSettings| {
             let size = 1.0 + k as f64;

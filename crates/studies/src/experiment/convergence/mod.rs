@@ -152,7 +152,6 @@ impl ConvergenceExperiment {
 /// The material drawn in full colour: Young's modulus (kPa), Poisson's ratio.
 const BASE: (f64, f64) = (12.0, 0.45);
 
-/// A description of a scene.
 fn described(scene: &str) -> &'static str {
     match scene {
         "sag" => "At rest under gravity, the lowest 42% of the nodes pinned: the exact step moves no node.",

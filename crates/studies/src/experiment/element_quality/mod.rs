@@ -28,7 +28,6 @@ const MODULI: [f64; 5] = [3e3, 6e3, 12e3, 24e3, 48e3];
 /// Pin rules: name, and the share of the lowest nodes of the rest of the organ that is also pinned.
 const PINS: [(&str, f64); 2] = [("far-end", 0.0), ("far-end + band", 0.42)];
 
-/// Grasp designs.
 const DESIGNS: [GraspDesignName; 2] = [GraspDesignName::LivePose, GraspDesignName::Compliant];
 
 /// Organ coordinate of the grasp.
@@ -59,7 +58,6 @@ pub struct ElementQualityExperiment {
     pub threads: usize,
 }
 
-/// A case.
 struct Case<'a> {
     pins: &'static str,
     modulus: f64,
@@ -161,7 +159,6 @@ mod tests {
     use crate::names::design_name;
     use crate::trials::Resumed;
 
-    /// A made-up result.
     fn made_up_result() -> ElementQualityResult {
         let mut rows = Vec::new();
         for (pins, _) in PINS {

@@ -129,7 +129,6 @@ fn table_ii(r: &GraspDesignsResult, condition: Condition) -> Table {
     Table::new(head, rows.flat_map(|row| std::iter::once(measured(row)).chain(paper(row))).collect())
 }
 
-/// First grasps of one design.
 fn first_grasps<'a>(
     r: &'a GraspDesignsResult,
     condition: Condition,

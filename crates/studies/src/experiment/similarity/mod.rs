@@ -132,7 +132,7 @@ impl SimilarityExperiment {
             rendered: &rendered,
             covered: &first.instruments,
             second: second.as_ref().map(|s| (&s.color, &s.instruments)),
-            composite: Some(&made.background),
+            composite: Some(&made.composite.color),
         })?;
         rendered.write_png(&folder.join("rendered.png"))?;
         first.color.write_png(&folder.join("real.png"))?;

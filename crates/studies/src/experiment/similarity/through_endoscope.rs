@@ -69,7 +69,7 @@ pub(super) fn through_endoscope(
         rendered: &rendered,
         covered: &masked(&map, &first.instruments),
         second: second.as_ref().map(|(color, covered)| (color, covered)),
-        composite: Some(&seen(&made.background)),
+        composite: Some(&seen(&made.composite.color)),
     })?;
     if light == Illumination::Room {
         let lit = scenery.through_endoscope(&scope, &Pose::IDENTITY, WHITE_AT, samples)?;

@@ -84,7 +84,6 @@ impl Study for WrenchExperiment {
 }
 
 impl WrenchExperiment {
-    /// Noise of one reading.
     fn noise(&self) -> SensorNoise {
         SensorNoise { force: self.force_noise, torque: self.torque_noise }
     }
