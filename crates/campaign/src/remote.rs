@@ -56,9 +56,6 @@ pub(super) struct RemotePolicy {
 impl RemotePolicy {
     /// A server's policy, or a Python policy. `server` is the running server of a Python policy;
     /// without one, `$TROCAR_PYTHON`, `python` or `python3` starts it.
-    ///
-    /// # Errors
-    /// A Python policy that cannot be loaded.
     pub fn new(
         spec: &PolicySpec,
         episode: &Episode,

@@ -85,9 +85,6 @@ struct Scratch {
 
 /// Builds the composite. It takes 6 bytes per pixel and frame of the window. Broken frames are left
 /// out, with a note.
-///
-/// # Errors
-/// A centre outside the recording, too few whole frames, or an interruption.
 pub fn composite(
     recording: &Recording,
     settings: &Settings,

@@ -42,9 +42,6 @@ pub struct Closed {
 }
 
 /// Closes the organ inside `mask`. Adds notes for the user to `notes`.
-///
-/// # Errors
-/// When no depth was measured inside the mask, or no closed surface results.
 pub fn close(info: &OrganInfo, mut mask: Mask, view: &View<'_>, notes: &mut Vec<String>) -> Result<Closed> {
     let View { background, ref camera, depth_scale, back: back_rule, surface: rule } = *view;
     let name = &info.name;

@@ -5,7 +5,6 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::Ranged;
 use std::ops::Range;
 
-/// An axis with its ticks.
 pub struct Axis {
     inner: RangedCoordf64,
     ticks: Vec<f64>,

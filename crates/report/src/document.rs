@@ -35,6 +35,9 @@ enum Block {
     Table(Table),
 }
 
+/// A column of a table: its name, units in round brackets, and its cell of a row.
+pub type Column<'a, T> = (&'a str, &'a dyn Fn(&T) -> String);
+
 /// A table of plain texts.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
@@ -49,9 +52,8 @@ impl Table {
         Self { head: head.into_iter().map(Into::into).collect(), rows, only_page: false }
     }
 
-    /// A table of `rows` by columns: the name of each, units in round brackets, and its cell of a
-    /// row.
-    pub fn of<T>(rows: impl IntoIterator<Item = T>, columns: &[(&str, &dyn Fn(&T) -> String)]) -> Self {
+    /// A table of `rows` by columns.
+    pub fn of<T>(rows: impl IntoIterator<Item = T>, columns: &[Column<'_, T>]) -> Self {
         let cells = |row| columns.iter().map(|(_, cell)| cell(&row)).collect();
         Self::new(columns.iter().map(|(name, _)| *name), rows.into_iter().map(cells).collect())
     }

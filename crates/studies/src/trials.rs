@@ -73,9 +73,6 @@ pub(crate) struct Trials {
 impl Trials {
     /// Opens the file of `study` in `folder`, which must exist. `settings` is everything that a row
     /// depends on besides its key; the program is added.
-    ///
-    /// # Errors
-    /// A file that cannot be read or written, or that another run uses.
     pub fn open(folder: &Path, experiment: &str, settings: &str) -> Result<Self> {
         let settings = format!("{:016x}", xxh3_64(format!("{settings}\n{}", program()).as_bytes()));
         let header = Header { experiment: experiment.to_owned(), settings };
@@ -116,9 +113,6 @@ impl Trials {
     ///
     /// A row that cannot be read back, such as one with an infinity, is not stored; every run
     /// computes it again.
-    ///
-    /// # Errors
-    /// The first error of a trial, an interruption, an unwritable file, two items with one key.
     pub fn run<T: Sync, R: Serialize + DeserializeOwned + Send>(
         &self,
         stage: &str,

@@ -21,7 +21,6 @@ const MAX_STILLS: usize = 7;
 const FRAME_INTERVAL: f64 = 0.1;
 const MAX_FRAMES: usize = 150;
 
-/// Pictures of an episode.
 #[derive(Clone, Debug, Default)]
 pub struct Pictures {
     /// Captions and pictures.
@@ -65,7 +64,6 @@ impl Recorder {
         }
     }
 
-    /// Records only stills.
     #[must_use]
     pub fn stills_only(self) -> Self {
         Self { records_video: false, depth: None, ..self }
@@ -122,9 +120,6 @@ impl Recorder {
     }
 
     /// Returns all pictures, with one of the end.
-    ///
-    /// # Errors
-    /// The first error of any picture.
     pub fn finish(mut self, cell: &Cell) -> Result<Pictures> {
         if let Some(error) = self.failed {
             return Err(error);

@@ -34,7 +34,6 @@ pub fn run(arguments: &Reconstruct, json: bool, progress: &dyn Progress) -> Resu
     Ok(())
 }
 
-/// The specimen as text.
 pub fn text(r: &Reconstructed) -> String {
     let number = |x: Option<f64>| x.map_or("-".to_owned(), |x| format!("{x:.2}"));
     let table = Table::of(

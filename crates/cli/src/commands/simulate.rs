@@ -48,7 +48,6 @@ pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<
     Ok(())
 }
 
-/// A run as text.
 pub fn text(r: &LiftResult) -> String {
     let s = &r.episode.summary;
     let d = &s.details;

@@ -27,9 +27,6 @@ pub(super) struct TimePlot<'a> {
 
 impl TimePlot<'_> {
     /// The plot of `channels` over `bands`.
-    ///
-    /// # Errors
-    /// A plot that cannot be drawn.
     pub fn figure(self, channels: &[Channels], bands: Vec<Band>) -> Result<String> {
         let line = |(_, value, color): &Curve<'_>| {
             Line::new(channels.iter().map(|c| (c.time_s, value(c))).collect(), colors::organ(*color))

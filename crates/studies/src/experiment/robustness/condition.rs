@@ -34,7 +34,6 @@ impl Condition {
         format!("{} {}{number} from {} times {}", self.factor, self.value, self.seeds[0], self.seeds.len())
     }
 
-    /// The specimens of its episodes.
     pub fn specimens(&self) -> Vec<SpecimenSource> {
         let mut all: Vec<SpecimenSource> = self.seeds.iter().map(|seed| self.scene.draw(*seed).specimen).collect();
         all.sort_by_key(SpecimenSource::label);
