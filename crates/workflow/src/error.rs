@@ -34,6 +34,9 @@ pub enum Error {
     /// An image or camera is unusable.
     #[error(transparent)]
     Camera(#[from] trocar_camera::Error),
+    /// Two pictures cannot be compared.
+    #[error(transparent)]
+    Similarity(#[from] trocar_camera::metrics::Error),
     /// The output would replace or change the input.
     #[error("the output folder {output} overlaps the input {input}; choose another output folder", output = output.display(), input = input.display())]
     Overlap {
@@ -58,6 +61,9 @@ pub enum Error {
         /// Number of episodes of the whole campaign.
         planned: usize,
     },
+    /// A step of a study failed.
+    #[error("{0}")]
+    Study(String),
     /// A result cannot be serialised.
     #[error("the result cannot be written: {0}")]
     Format(String),

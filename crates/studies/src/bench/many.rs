@@ -1,6 +1,6 @@
 //! Many small models in parallel, beside one model of the same total size.
 
-use crate::scenes::{self, Organs, Run, Scene, material};
+use crate::scenes::{Organs, Run, Scene, material};
 use crate::statistics::median;
 use crate::{Error, Result};
 use serde::Serialize;
@@ -57,7 +57,7 @@ pub(super) fn measure(
     for name in SOLVERS {
         let schedule = solver_named(name)?;
         for &threads in threads {
-            let mut many = (0..count).map(|_| Run::new(&single, schedule, 1)).collect::<scenes::Result<Vec<_>>>()?;
+            let mut many = (0..count).map(|_| Run::new(&single, schedule, 1)).collect::<Result<Vec<_>>>()?;
             let (mut one, mut large) = (Run::new(&together, schedule, threads)?, Run::new(&six, schedule, threads)?);
             let mut times: [Vec<f64>; 3] = Default::default();
             let whole = Instant::now();
@@ -101,8 +101,7 @@ pub(super) fn measure(
 fn step_all(runs: &mut [Run<'_>], threads: usize) -> Result<()> {
     let share = runs.len().div_ceil(threads.max(1)).max(1);
     std::thread::scope(|scope| {
-        let step =
-            |part: &mut [Run<'_>]| -> Result<()> { part.iter_mut().try_for_each(|run| Ok(run.frame().map(|_| ())?)) };
+        let step = |part: &mut [Run<'_>]| -> Result<()> { part.iter_mut().try_for_each(|run| run.frame().map(|_| ())) };
         let others: Vec<_> = runs.chunks_mut(share).map(|part| scope.spawn(move || step(part))).collect();
         let lost = || Err(Error::Mismatch("a worker thread panicked".to_owned()));
         others.into_iter().try_for_each(|thread| thread.join().unwrap_or_else(|_| lost()))

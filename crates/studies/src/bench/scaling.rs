@@ -126,7 +126,6 @@ impl ScalingBench {
             return Ok(ScalingRow { nodes, ..blank(schedule, threads, tets, why) });
         }
         let timed = Run::new(scene, solver_named(schedule)?, threads)
-            .map_err(Error::from)
             .and_then(|mut run| Timing::of(&mut run, WARM_UP, FRAMES, self.budget, progress));
         let (timing, skipped) = match timed {
             Ok(timing) => (Some(timing), None),

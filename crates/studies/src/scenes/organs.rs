@@ -1,7 +1,7 @@
 //! Organs of scenes: read from a mesh file, or procedural.
 
-use super::error::{Error, Result};
 use super::shapes::{self, BentTube};
+use crate::{Error, Result};
 use glam::DVec3;
 use std::path::Path;
 use trocar_geometry::io::read_msh_groups;

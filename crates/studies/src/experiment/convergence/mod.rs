@@ -125,7 +125,6 @@ impl ConvergenceExperiment {
         progress: &dyn Progress,
     ) -> Result<ConvergenceCase> {
         let made = Scene::named(scene, organs, material(young, poisson))
-            .map_err(Error::from)
             .and_then(|scene| step_ladder::measure(&scene, &SOLVERS, self.max_iterations, progress));
         let (rows, failure) = match made {
             Ok(rows) => (rows, None),

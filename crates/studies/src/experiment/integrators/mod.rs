@@ -5,7 +5,7 @@ mod forms;
 mod row;
 
 use crate::names::Recorded;
-use crate::scenes::{FRAME, Organs, Scene, material, mean_error, rest_positions};
+use crate::scenes::{FRAME, Organs, Scene, material, mean_error, reference, rest_positions};
 use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
@@ -158,7 +158,7 @@ struct Equilibrium {
 impl Equilibrium {
     fn of(model: &Model) -> Result<Self> {
         let mut state = OracleState::new(model);
-        Oracle::new(model).settle(model, &mut state, &[])?;
+        Oracle::new(model).settle(model, &mut state, &[]).map_err(reference)?;
         let rest = rest_positions(model);
         let positions: Vec<DVec3> =
             (0..model.bodies().len()).flat_map(|b| state.positions(b).iter().copied()).collect();
@@ -175,7 +175,7 @@ fn measured(
     threads: usize,
     progress: &dyn Progress,
 ) -> Result<IntegratorRow> {
-    let mut stepper = form.scheme.stepper(model, FRAME, threads)?;
+    let mut stepper = form.scheme.stepper(model, FRAME, threads).map_err(reference)?;
     let mut state = State::new(model);
     let mut mean = vec![DVec3::ZERO; truth.rest.len()];
     let first_measured = frames - ((AVERAGED_SHARE * frames as f64) as usize).max(1);
