@@ -62,8 +62,8 @@ pub enum Error {
         planned: usize,
     },
     /// A step of a study failed.
-    #[error("{0}")]
-    Study(String),
+    #[error(transparent)]
+    Study(Box<dyn std::error::Error + Send + Sync>),
     /// A result cannot be serialised.
     #[error("the result cannot be written: {0}")]
     Format(String),

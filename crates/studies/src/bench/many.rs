@@ -65,8 +65,8 @@ pub(super) fn measure(
                 check_interrupted(progress)?;
                 let took = [
                     timed(|| step_all(&mut many, threads))?,
-                    timed(|| Ok(one.frame().map(|_| ())?))?,
-                    timed(|| Ok(large.frame().map(|_| ())?))?,
+                    timed(|| one.frame().map(|_| ()))?,
+                    timed(|| large.frame().map(|_| ()))?,
                 ];
                 progress.advance(1);
                 if frame >= WARM_UP {

@@ -38,7 +38,7 @@ impl<'a> Run<'a> {
         self.frames += 1;
         match report.divergence {
             None => Ok(report),
-            Some(why) => Err(Error::Study(format!("scene '{}', frame {}: {why}", self.scene.name, self.frames))),
+            Some(why) => Err(Error::Study(format!("scene '{}', frame {}: {why}", self.scene.name, self.frames).into())),
         }
     }
 
@@ -64,7 +64,7 @@ pub fn tools(scene: &Scene, from: f64, to: f64) -> Vec<ToolMotion> {
 
 /// An error of the oracle or of a comparator, as one of a study.
 pub(crate) fn reference(error: trocar_tissue_reference::Error) -> Error {
-    Error::Study(error.to_string())
+    Error::Study(error.into())
 }
 
 /// A run of a scene by the oracle, substep by substep.

@@ -55,7 +55,7 @@ pub(super) fn record(from: &Path, to: &Path, samples: u32, progress: &dyn Progre
     for frame in 0..FRAMES {
         if let Err(e) = check_interrupted(progress) {
             progress.end();
-            return Err(e.into());
+            return Err(e);
         }
         let settings = RenderSettings::Path { samples, bounces: 4, seed: frame };
         let noise = Noise { shot: 0.01, read: 0.004, seed: 5, frame };
