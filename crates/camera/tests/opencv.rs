@@ -80,7 +80,6 @@ fn every_model_agrees_with_opencv() {
             // 3e-5.
             worst[2] = worst[2].max((*ours - glam::DVec2::from(theirs)).length());
         }
-        println!("{name}: projected {:.1e}, undistorted {:.1e}, maps {:.1e} px", worst[0], worst[1], worst[2]);
         assert!(worst.iter().all(|w| *w < TOLERANCE), "{name}: {worst:?}");
         for ending in ["yml", "json"] {
             let back = CameraModel::read_calibration(&file(&format!("back.{ending}"))).unwrap();

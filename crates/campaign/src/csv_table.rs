@@ -57,9 +57,6 @@ fn drawn(k: &EpisodeRecord) -> Vec<(String, String)> {
 
 /// The table of `records`. Its last columns are the times at which the stages of the task passed
 /// (s), empty if they did not, and what was drawn for the episode.
-///
-/// # Errors
-/// A table that cannot be written as CSV.
 pub(super) fn csv_table(records: &[EpisodeRecord]) -> Result<String> {
     let format = |e: csv::Error| Error::Format(e.to_string());
     let stages = records.first().map_or(&[][..], |k| &k.summary.progress.stages);

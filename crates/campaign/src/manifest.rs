@@ -35,9 +35,6 @@ pub fn named_specimen(scene: &Scene, split: Split) -> SpecimenSource {
 
 /// Checks the options of a campaign, without its specimen. `max_episodes` is the value of
 /// `--rollouts`, from which `experiment rollouts` computes `episodes`.
-///
-/// # Errors
-/// Names the option and its allowed values.
 pub(super) fn check(policies: &[PolicySpec], episodes: usize, seed: u64, max_episodes: Option<usize>) -> Result<()> {
     check_policies(policies)?;
     let wrong = |why: String| Err(Error::Mismatch(why));
@@ -60,9 +57,6 @@ pub(super) fn check(policies: &[PolicySpec], episodes: usize, seed: u64, max_epi
 }
 
 /// Checks the policies of a campaign.
-///
-/// # Errors
-/// No policy, two of one name, an address that is invalid.
 pub(super) fn check_policies(policies: &[PolicySpec]) -> Result<()> {
     let wrong = |why: String| Err(Error::Mismatch(why));
     if policies.is_empty() {
@@ -82,9 +76,6 @@ pub(super) fn check_policies(policies: &[PolicySpec]) -> Result<()> {
 }
 
 /// Checks the policy and the seed of a single episode.
-///
-/// # Errors
-/// As [`check_policies`]; a seed that servers cannot receive.
 pub(super) fn check_episode(policy: &PolicySpec, seed: u64) -> Result<()> {
     check_policies(std::slice::from_ref(policy))?;
     if policy.is_remote() && i64::try_from(seed).is_err() {

@@ -9,18 +9,16 @@ use crate::store::{EpisodeRecord, Store};
 use crate::table::{CampaignResult, Interval, PolicyRow};
 use crate::variation_page;
 use crate::videos;
+use trocar_report::document::Table;
 use trocar_report::figures;
 use trocar_report::page::{self, Card, Columns};
-use trocar_report::table::{self, fixed, percent};
+use trocar_report::table::{fixed, or_dash, percent};
 use trocar_workflow::{Result, counted};
 
 /// Maximum number of failures in the list.
 const MAX_LISTED: usize = 40;
 
 /// The page of a campaign.
-///
-/// # Errors
-/// A plot that cannot be drawn, channels that cannot be read.
 pub(crate) fn campaign(
     manifest: &Manifest,
     result: &CampaignResult,
@@ -98,7 +96,6 @@ fn body(manifest: &Manifest, r: &CampaignResult, records: &[EpisodeRecord], stor
     .concat())
 }
 
-/// A sentence from words.
 fn sentence(words: &str) -> String {
     let mut letters = words.chars();
     letters.next().map_or_else(String::new, |first| format!("{}{}.", first.to_uppercase(), letters.as_str()))
@@ -106,10 +103,6 @@ fn sentence(words: &str) -> String {
 
 pub(super) fn share(i: &Interval) -> String {
     format!("{} ({}\u{2013}{})", percent(i.share, 0), percent(i.low, 0), percent(i.high, 0))
-}
-
-fn or_dash(value: Option<f64>, decimals: usize) -> String {
-    value.map_or("\u{2013}".to_owned(), |v| fixed(v, decimals))
 }
 
 fn cards(manifest: &Manifest, r: &CampaignResult) -> String {
@@ -149,50 +142,32 @@ fn cards(manifest: &Manifest, r: &CampaignResult) -> String {
 }
 
 fn outcome(r: &CampaignResult) -> String {
-    let head = [
-        "policy",
-        "episodes",
-        "distinct",
-        "passed",
-        "mean score",
-        "not passed in time",
-        "RCM abort",
-        "diverged",
-        "policy failed",
-        "attached",
-        "held",
-        "lift (mm)",
-        "RCM under load, median (mm)",
-        "RCM, max (mm)",
-        "lag (ms)",
-        "jaw force (N)",
-        "grasp at s",
-        "suspensions",
-    ];
-    let row = |p: &PolicyRow| {
-        let at = p.grasp_at.map_or("\u{2013}".to_owned(), |[m, l, h]| format!("{m:.2} ({l:.2}\u{2013}{h:.2})"));
-        vec![
-            p.policy.clone(),
-            p.episodes.to_string(),
-            p.distinct_outcomes.to_string(),
-            format!("{}, {}", p.passed, share(&p.interval)),
-            fixed(p.mean_score, 2),
-            (p.ends.time_out + p.ends.finished + p.ends.aborted).to_string(),
-            p.ends.rcm_abort.to_string(),
-            p.ends.diverged.to_string(),
-            p.ends.policy_error.to_string(),
-            p.attached.to_string(),
-            if p.attached > 0 { p.held_to_end.to_string() } else { "\u{2013}".to_owned() },
-            or_dash(p.lift_median_mm, 1),
-            or_dash(p.rcm_median_mm, 3),
-            or_dash(p.rcm_max_mm, 3),
-            or_dash(p.lag_ms, 0),
-            or_dash(p.peak_jaw_n, 2),
-            at,
-            p.suspensions(),
-        ]
-    };
-    table::plain(&head, &r.policies.iter().map(row).collect::<Vec<_>>())
+    let at = |[m, l, h]: [f64; 3]| format!("{m:.2} ({l:.2}\u{2013}{h:.2})");
+    let dash = || "\u{2013}".to_owned();
+    let table = Table::of(
+        &r.policies,
+        &[
+            ("policy", &|p| p.policy.clone()),
+            ("episodes", &|p| p.episodes.to_string()),
+            ("distinct", &|p| p.distinct_outcomes.to_string()),
+            ("passed", &|p| format!("{}, {}", p.passed, share(&p.interval))),
+            ("mean score", &|p| fixed(p.mean_score, 2)),
+            ("not passed in time", &|p| (p.ends.time_out + p.ends.finished + p.ends.aborted).to_string()),
+            ("RCM abort", &|p| p.ends.rcm_abort.to_string()),
+            ("diverged", &|p| p.ends.diverged.to_string()),
+            ("policy failed", &|p| p.ends.policy_error.to_string()),
+            ("attached", &|p| p.attached.to_string()),
+            ("held", &|p| if p.attached > 0 { p.held_to_end.to_string() } else { dash() }),
+            ("lift (mm)", &|p| or_dash(p.lift_median_mm, 1)),
+            ("RCM under load, median (mm)", &|p| or_dash(p.rcm_median_mm, 3)),
+            ("RCM, max (mm)", &|p| or_dash(p.rcm_max_mm, 3)),
+            ("lag (ms)", &|p| or_dash(p.lag_ms, 0)),
+            ("jaw force (N)", &|p| or_dash(p.peak_jaw_n, 2)),
+            ("grasp at s", &|p| p.grasp_at.map_or_else(dash, at)),
+            ("suspensions", &|p| p.suspensions()),
+        ],
+    );
+    table.html()
 }
 
 fn failures(manifest: &Manifest, records: &[EpisodeRecord], store: &Store) -> Result<String> {
@@ -202,31 +177,25 @@ fn failures(manifest: &Manifest, records: &[EpisodeRecord], store: &Store) -> Re
     }
     let stopped = |k: &EpisodeRecord| format!("stopped at {}: {}", k.summary.next, why(k));
     let videos: Vec<String> = failed.iter().filter_map(|k| video(store, k, &stopped(k))).collect();
-    let rows: Vec<Vec<String>> = failed
-        .iter()
-        .take(MAX_LISTED)
-        .map(|k| {
-            let s = &k.summary;
-            let folder = format!("episodes/{}/{:06}", k.name, k.index);
-            vec![
-                k.name.clone(),
-                k.seed.to_string(),
-                format!("{} of {}", s.stage, s.progress.stages.len()),
-                s.next.clone(),
-                fixed(s.score, 2),
-                why(k),
-                folder,
-            ]
-        })
-        .collect();
+    let table = Table::of(
+        failed.iter().take(MAX_LISTED),
+        &[
+            ("policy", &|k| k.name.clone()),
+            ("seed", &|k| k.seed.to_string()),
+            ("stages", &|k| format!("{} of {}", k.summary.stage, k.summary.progress.stages.len())),
+            ("stopped at", &|k| k.summary.next.clone()),
+            ("score", &|k| fixed(k.summary.score, 2)),
+            ("why", &|k| why(k)),
+            ("folder", &|k| format!("episodes/{}/{:06}", k.name, k.index)),
+        ],
+    );
     let lead = format!(
         "{} did not pass{}; lowest scores first, policies in turn. <code>trocar render FOLDER</code> shows one, \
          <code>trocar replay FOLDER --verify</code> verifies it.",
         counted(failed.len(), "episode"),
         if failed.len() > MAX_LISTED { format!("; {MAX_LISTED} are listed") } else { String::new() }
     );
-    let table = table::plain(&["policy", "seed", "stages", "stopped at", "score", "why", "folder"], &rows);
-    Ok(page::section("Failures", &lead, &(page::grid(Columns::Two, &videos) + &table)))
+    Ok(page::section("Failures", &lead, &(page::grid(Columns::Two, &videos) + &table.html())))
 }
 
 /// The section of successes; empty without a video of one.
@@ -260,41 +229,29 @@ pub(super) fn why(k: &EpisodeRecord) -> String {
 /// Median times at which the stages passed.
 fn stage_table(r: &CampaignResult) -> String {
     let Some(first) = r.policies.first() else { return String::new() };
-    let head: Vec<&str> =
-        ["median time (s)"].into_iter().chain(first.stages.iter().map(|s| s.stage.as_str())).collect();
+    let head = ["median time (s)"].into_iter().chain(first.stages.iter().map(|s| s.stage.as_str()));
     let row = |p: &PolicyRow| {
         let times = p.stages.iter().map(|s| or_dash(s.median_s, 2));
         [p.policy.clone()].into_iter().chain(times).collect()
     };
-    table::plain(&head, &r.policies.iter().map(row).collect::<Vec<Vec<String>>>())
+    Table::new(head, r.policies.iter().map(row).collect()).html()
 }
 
 fn pairs(r: &CampaignResult) -> String {
     if r.comparisons.is_empty() {
         return String::new();
     }
-    let rows: Vec<Vec<String>> = r
-        .comparisons
-        .iter()
-        .map(|c| {
-            vec![
-                format!("{} against {}", c.a, c.b),
-                c.seeds.to_string(),
-                c.only_a.to_string(),
-                c.only_b.to_string(),
-                if c.p < 1e-3 { "< 0.001".to_owned() } else { fixed(c.p, 3) },
-                format!("{:+.2}", c.score_difference),
-            ]
-        })
-        .collect();
-    let head = [
-        "policies",
-        "seeds",
-        "only the first passed",
-        "only the second passed",
-        "p (McNemar)",
-        "difference of mean scores",
-    ];
+    let table = Table::of(
+        &r.comparisons,
+        &[
+            ("policies", &|c| format!("{} against {}", c.a, c.b)),
+            ("seeds", &|c| c.seeds.to_string()),
+            ("only the first passed", &|c| c.only_a.to_string()),
+            ("only the second passed", &|c| c.only_b.to_string()),
+            ("p (McNemar)", &|c| if c.p < 1e-3 { "< 0.001".to_owned() } else { fixed(c.p, 3) }),
+            ("difference of mean scores", &|c| format!("{:+.2}", c.score_difference)),
+        ],
+    );
     let lead = "Policies on the same seeds, so that differences between seeds cancel. p: probability of a split at least as uneven by chance.";
-    page::section("Policies in pairs", lead, &table::plain(&head, &rows))
+    page::section("Policies in pairs", lead, &table.html())
 }

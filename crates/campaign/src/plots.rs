@@ -28,12 +28,12 @@ fn color(manifest: &Manifest, name: &str) -> [u8; 3] {
 /// A figure of `plot` under the `caption` and the legend of the policies.
 fn figure(manifest: &Manifest, plot: &Plot<'_>, caption: &str) -> Result<String> {
     let legend = page::legend(manifest.policies.iter().map(|p| (p.name.as_str(), color(manifest, &p.name))));
-    Ok(page::figure(&plot.svg()?, &format!("{caption}{legend}")))
+    Ok(plot.figure(&format!("{caption}{legend}"))?)
 }
 
 /// A plot of the share of episodes, from 0 to 1, against `x`.
 fn share_plot<'a>(title: &'a str, x: &'a str, y: &'a str, lines: Vec<Line>) -> Plot<'a> {
-    Plot { title, x, y, lines, bands: vec![], show: vec![0.0, 1.0], limits: vec![], log_x: false, log_y: false }
+    Plot { title, x, y, lines, show: vec![0.0, 1.0], ..Plot::default() }
 }
 
 /// Lift against RCM deviation of every episode with a grasp, as in the paper's Fig. 6(d, e).
@@ -52,8 +52,8 @@ pub fn lift_and_rcm(manifest: &Manifest, records: &[EpisodeRecord]) -> Result<St
     for k in &attached {
         let (x, y, color) = (lift(k), k.summary.rcm_peak_mm, color(manifest, &k.name));
         let (a, b) = (MARK_SIZE * width, 2.0 * MARK_SIZE * height);
-        lines.push(Line { points: vec![(x - a, y), (x + a, y)], color, filled: false });
-        lines.push(Line { points: vec![(x, y - b), (x, y + b)], color, filled: false });
+        lines.push(Line::new(vec![(x - a, y), (x + a, y)], color));
+        lines.push(Line::new(vec![(x, y - b), (x, y + b)], color));
     }
     let threshold = manifest.rcm_threshold_mm;
     let plot = Plot {
@@ -61,11 +61,9 @@ pub fn lift_and_rcm(manifest: &Manifest, records: &[EpisodeRecord]) -> Result<St
         x: "greatest lift (mm)",
         y: "largest RCM deviation (mm)",
         lines,
-        bands: vec![],
         show: vec![0.0],
         limits: if height > 0.5 * threshold { vec![threshold, ABORT_MM] } else { vec![] },
-        log_x: false,
-        log_y: false,
+        ..Plot::default()
     };
     figure(manifest, &plot, "<b>Lift against RCM deviation</b>, every episode with a grasp.")
 }
@@ -109,7 +107,7 @@ fn distribution(
         values.sort_by(f64::total_cmp);
         let n = values.len().max(1) as f64;
         let steps = values.iter().enumerate().flat_map(|(k, v)| [(*v, k as f64 / n), (*v, (k as f64 + 1.0) / n)]);
-        Line { points: steps.collect(), color: color(manifest, &policy.name), filled: false }
+        Line::new(steps.collect(), color(manifest, &policy.name))
     };
     let lines = manifest.policies.iter().map(line).collect();
     figure(manifest, &share_plot(name, x, "share of episodes", lines), &format!("<b>{name}.</b>"))
@@ -155,7 +153,7 @@ pub fn success_over(policies: &[&str], curve: &Curve) -> Result<String> {
     let title = format!("Success by {}", curve.name);
     let plot = Plot { log_x: curve.log, ..share_plot(&title, &curve.label, "share of episodes that passed", lines) };
     let legend = page::legend(policies.iter().enumerate().map(|(k, name)| (*name, colors::organ(k))));
-    Ok(page::figure(&plot.svg()?, &format!("<b>{}.</b>{legend}", page::escape(&title))))
+    Ok(plot.figure(&format!("<b>{}.</b>{legend}", page::escape(&title)))?)
 }
 
 /// The gates that are swept for a task: the range, and the label of its axis.
@@ -193,7 +191,7 @@ pub(super) fn sweeps(manifest: &Manifest, records: &[EpisodeRecord], store: &Sto
         for (policy, count, episodes) in channels.iter().filter(|(.., episodes)| !episodes.is_empty()) {
             let swept = sweep(episodes, std::slice::from_ref(&range), &mut || true)?;
             let points = swept.rows.iter().map(|r| (r.values[0], r.passed as f64 / *count as f64));
-            lines.push(Line { points: points.collect(), color: color(manifest, &policy.name), filled: false });
+            lines.push(Line::new(points.collect(), color(manifest, &policy.name)));
         }
         let plot = share_plot(x, x, "share of episodes that pass", lines);
         figures.push(figure(manifest, &plot, &format!("<b>{x}.</b>{note}"))?);

@@ -50,9 +50,6 @@ pub(crate) fn interpreter(preferred: Option<&str>) -> String {
 }
 
 /// Starts the servers of all Python policies among `policies`, by the policies' names.
-///
-/// # Errors
-/// The first policy that cannot be loaded; [`Error::Interrupted`].
 pub(crate) fn start_servers(
     policies: &[&PolicySpec],
     progress: &dyn Progress,
@@ -105,9 +102,6 @@ fn each_line(from: Option<impl Read + Send + 'static>, take: impl Fn(String) + S
 
 impl PolicyServer {
     /// Starts the server of a Python policy and waits for its address.
-    ///
-    /// # Errors
-    /// A server that does not start, ends early, or takes too long, in one line.
     pub fn start(python: &str, module: &str, stop: &AtomicBool) -> std::result::Result<Self, String> {
         let mut command = Command::new(python);
         // A terminal's Ctrl-C must reach only this process, which then ends the child. A child that

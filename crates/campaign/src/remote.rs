@@ -56,9 +56,6 @@ pub(super) struct RemotePolicy {
 impl RemotePolicy {
     /// A server's policy, or a Python policy. `server` is the running server of a Python policy;
     /// without one, `$TROCAR_PYTHON`, `python` or `python3` starts it.
-    ///
-    /// # Errors
-    /// A Python policy that cannot be loaded.
     pub fn new(
         spec: &PolicySpec,
         episode: &Episode,
@@ -203,9 +200,6 @@ impl RemotePolicy {
 
 /// The endpoint of the policy `spec`, with key and timeout of the environment. A Python callable
 /// has no address before it is served.
-///
-/// # Errors
-/// An address, a key or a timeout that is invalid.
 pub(super) fn endpoint(spec: &PolicySpec) -> Result<Endpoint> {
     let is_python = spec.source.starts_with(PYTHON_SOURCE);
     let mut endpoint = Endpoint::new(if is_python { "ws://127.0.0.1:1" } else { &spec.source });

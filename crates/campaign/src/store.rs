@@ -96,9 +96,6 @@ fn io(path: &Path) -> impl Fn(std::io::Error) -> Error + '_ {
 }
 
 /// The manifest of the campaign in `folder`; `None` if there is no campaign.
-///
-/// # Errors
-/// A folder with other contents, a manifest that is damaged or cannot be read.
 fn read_manifest(folder: &Path) -> Result<Option<Manifest>> {
     let path = folder.join(MANIFEST);
     let exists = |reason: String| Error::Exists { path: folder.to_owned(), reason };
@@ -129,9 +126,6 @@ fn read_manifest(folder: &Path) -> Result<Option<Manifest>> {
 
 /// Checks that `folder` can hold a campaign of `policies` that begins at `seed` of `split` and
 /// varies by `variation`, without its specimen.
-///
-/// # Errors
-/// As [`Store::open`].
 pub(super) fn check_compatible(
     folder: &Path,
     policies: &[PolicySpec],

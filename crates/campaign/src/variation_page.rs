@@ -9,8 +9,9 @@ use crate::plots;
 use crate::store::EpisodeRecord;
 use crate::table::{CampaignResult, Interval};
 use std::collections::BTreeMap;
+use trocar_report::document::Table;
 use trocar_report::page::{self, Columns};
-use trocar_report::table;
+use trocar_report::table::yes_or_no;
 use trocar_scene::{Split, VariationSet};
 use trocar_workflow::{Result, counted};
 
@@ -62,7 +63,7 @@ pub(super) fn varied(manifest: &Manifest, r: &CampaignResult, records: &[Episode
     let names = ["factor", "what it is", "distribution", "drawn"];
     let lead =
         format!("{set}, drawn by the seed of each episode ({}). {split}", counted(r.variation.episodes.len(), "seed"));
-    page::section("Variation", &lead, &table::plain(&names, &rows))
+    page::section("Variation", &lead, &Table::new(names, rows).html())
 }
 
 /// Success by factor; empty if nothing varied. A factor with a single bin of episodes is left out:
@@ -100,24 +101,23 @@ fn weakest(r: &CampaignResult, curves: &[&Curve]) -> String {
             .reduce(|least, next| if next.1.interval.share < least.1.interval.share { next } else { least });
         least.map_or("\u{2013}".to_owned(), |(bin, s)| format!("{}: {}/{}", bin.value, s.passed, s.episodes))
     };
-    let head: Vec<&str> =
-        ["least success at"].into_iter().chain(r.policies.iter().map(|p| p.policy.as_str())).collect();
+    let head = ["least success at"].into_iter().chain(r.policies.iter().map(|p| p.policy.as_str()));
     let row = |curve: &&Curve| {
         std::iter::once(curve.label.clone()).chain((0..r.policies.len()).map(|k| cell(curve, k))).collect::<Vec<_>>()
     };
-    table::plain(&head, &curves.iter().map(row).collect::<Vec<_>>())
+    Table::new(head, curves.iter().map(row).collect()).html()
 }
 
 fn by_value(curve: &Curve) -> String {
     let Some(first) = curve.bins.first() else { return String::new() };
     let names = first.policies.iter().map(|s| s.policy.as_str());
-    let head: Vec<&str> = std::iter::once(curve.label.as_str()).chain(names).collect();
+    let head = std::iter::once(curve.label.as_str()).chain(names);
     let said = |passed: usize, all: usize, i: &Interval| format!("{passed}/{all}, {}", share(i));
     let row = |bin: &crate::curves::Bin| {
         let cells = bin.policies.iter().map(|s| said(s.passed, s.episodes, &s.interval));
         std::iter::once(bin.value.clone()).chain(cells).collect::<Vec<_>>()
     };
-    table::plain(&head, &curve.bins.iter().map(row).collect::<Vec<_>>())
+    Table::new(head, curve.bins.iter().map(row).collect()).html()
 }
 
 /// Every episode with what was drawn for it, folded.
@@ -127,7 +127,7 @@ pub(super) fn episodes(records: &[EpisodeRecord]) -> String {
         .find_map(|k| k.summary.drawn.as_ref())
         .map_or_else(Vec::new, |drawn| drawn.values.iter().map(|v| v.name()).collect());
     let fixed = ["policy", "seed", "split", "passed", "stages", "end", "suspensions", "specimen"];
-    let head: Vec<&str> = fixed.into_iter().chain(names.iter().map(String::as_str)).collect();
+    let head = fixed.into_iter().chain(names.iter().map(String::as_str));
     let row = |k: &EpisodeRecord| {
         let s = &k.summary;
         let drawn = s.drawn.as_ref();
@@ -139,7 +139,7 @@ pub(super) fn episodes(records: &[EpisodeRecord]) -> String {
             k.name.clone(),
             k.seed.to_string(),
             Split::of_seed(k.seed).name().to_owned(),
-            if s.passed { "yes" } else { "no" }.to_owned(),
+            yes_or_no(s.passed),
             format!("{} of {}", s.stage, s.progress.stages.len()),
             if s.passed { "passed".to_owned() } else { why(k) },
             format!("{}/{}/{}", s.disabled_contacts, s.disabled_blades, s.relaxed),
@@ -152,5 +152,5 @@ pub(super) fn episodes(records: &[EpisodeRecord]) -> String {
     let title = format!("{note}{}", counted(records.len(), "episode"));
     let lead = "What was drawn for each episode, and how it ended. Suspensions: contacts disabled, contacts of blades \
                 disabled, organs relaxed. <code>table.csv</code> has all figures.";
-    page::section("Episodes", lead, &page::fold(&title, &table::plain(&head, &rows)))
+    page::section("Episodes", lead, &page::fold(&title, &Table::new(head, rows).html()))
 }

@@ -10,7 +10,7 @@ use trocar_scene::Scene;
 use trocar_task::{EPISODE_FILE, Episode, EpisodeFile};
 use trocar_workflow::episode_replay::EpisodeReplay;
 use trocar_workflow::video::webp;
-use trocar_workflow::{Error, Result, SpecimenCache};
+use trocar_workflow::{Result, SpecimenCache, check_interrupted};
 
 /// Maximum numbers of failures and of successes with a video. The policies take turns.
 const MAX_FAILURES: usize = 4;
@@ -53,9 +53,6 @@ fn in_turn<'a>(manifest: &Manifest, records: &'a [EpisodeRecord], passed: bool) 
 
 /// Renders videos of the first failures and successes that have none yet. Skips an episode whose
 /// replay differs from its file, as on another machine.
-///
-/// # Errors
-/// A damaged episode, a video that cannot be written, an interruption.
 pub(super) fn write(
     store: &Store,
     manifest: &Manifest,
@@ -91,9 +88,7 @@ pub(super) fn write(
             Ok(())
         };
         while replay.advance() {
-            if progress.interrupted() {
-                return Err(Error::Interrupted);
-            }
+            check_interrupted(progress)?;
             if replay.difference().is_some() {
                 break;
             }

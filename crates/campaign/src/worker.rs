@@ -16,7 +16,6 @@ use trocar_workflow::{Error, Result, SpecimenCache};
 /// A cell with policies, which runs one job at a time.
 pub struct Worker {
     episode: Episode,
-    /// By name.
     policies: BTreeMap<String, Box<dyn Policy + Send>>,
     stop: Arc<AtomicBool>,
     /// Interpreter of Python policies unless `$TROCAR_PYTHON` names one.

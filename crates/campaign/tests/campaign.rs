@@ -10,23 +10,13 @@ use tempfile::TempDir;
 use trocar_campaign::{Campaign, EpisodeFiles, Job, Manifest, PolicySpec, Store, run_episode};
 use trocar_core::{Silent, StopAfter};
 use trocar_remote::{Array, Call, Dialect, Loopback, LoopbackOptions, Map, Value};
-use trocar_scene::{Distribution, Factor, Scene, SpecimenSource, Specimens, Split, TaskName, VariationSet};
+use trocar_scene::{Distribution, Factor, Scene, Specimens, Split, TaskName, VariationSet};
 use trocar_task::EpisodeFile;
 use trocar_testing::tube;
 use trocar_workflow::EpisodeRun;
 
-/// A coarse tube on disk, and a scene of it in which arms reach for half a second before the
-/// endoscope.
 fn scene(folder: &Path) -> PathBuf {
-    tube::two_tubes(tube::ONE_END, 4e-3).write(&folder.join("tube")).unwrap();
-    let mut scene = tube::resection();
-    scene.specimen = SpecimenSource { path: Some("tube".to_owned()), phantom: None, seed: 1 };
-    scene.task.name = TaskName::PortReach;
-    scene.task.episode_s = 0.5;
-    scene.cameras.retain(|c| c.name == "endoscope");
-    let file = folder.join("reach.toml");
-    std::fs::write(&file, scene.to_toml().unwrap()).unwrap();
-    file
+    tube::reach(folder, "reach.toml", 0.5, &["endoscope"])
 }
 
 fn campaign(folder: &Path, policies: &[&str], episodes: usize) -> Campaign {

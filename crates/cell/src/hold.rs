@@ -61,7 +61,6 @@ impl Hold {
         self.now(world) == self.centroid
     }
 
-    /// The numbers of its state.
     pub fn numbers(&self) -> impl Iterator<Item = f64> {
         let Self { organ, nodes, centroid, centroid_in_jaw, jaw } = self;
         let vectors = [*centroid, *centroid_in_jaw, *jaw].map(|v| v.to_array());

@@ -159,9 +159,6 @@ impl World {
     }
 
     /// Restores what [`World::save`] returned. The steps after it are the same to the bit.
-    ///
-    /// # Errors
-    /// Threads that the system refuses.
     pub(crate) fn restore(&mut self, saved: &WorldState) -> Result<()> {
         let sizes = |model: &Model| model.bodies().iter().map(|b| b.len()).collect::<Vec<_>>();
         if self.cuts == 0 && saved.cuts == 0 && sizes(&self.model) != sizes(&saved.model) {

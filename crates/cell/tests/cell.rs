@@ -137,7 +137,6 @@ fn every_kind_of_arm_lifts_the_tube_by_actions() {
             let (_, reports) = grasp_and_lift(&mut cell, "left", HELD, 0.015);
             let carried = cell.carried(0).unwrap();
             let worst = |of: fn(&CellReport) -> f64| reports.iter().map(of).fold(0.0, f64::max);
-            println!("{name}, {design:?}: {carried:?}, rcm {} m", worst(|r| r.arms[0].rcm_peak));
             assert!((carried.tissue_lift - 0.015).abs() < 0.002 && carried.slip < 0.003, "{name}: {carried:?}");
             assert!(reports.iter().all(|r| r.tissue.inverted == 0 && r.tissue.divergence.is_none()), "{name}");
             assert!(worst(|r| r.arms[0].rcm_peak) < if name == "dynamic" { 3e-3 } else { 1e-12 });
@@ -276,14 +275,8 @@ fn pressing_on_stiff_tissue_neither_swings_nor_drifts_and_the_shaft_comes_back()
         let force = |r: &CellReport| r.arms[0].contact.length();
         let mean = last.iter().map(force).sum::<f64>() / last.len() as f64;
         let swing = last.iter().map(|r| (force(r) - mean).abs()).fold(0.0, f64::max);
-        let rate = |r: &CellReport| r.arms[0].rates[2].abs();
-        let speed = last.iter().map(rate).fold(0.0, f64::max);
         let peak = pressed.iter().map(force).fold(0.0, f64::max);
-        let [a, b, c] = [&free, pressed.last().unwrap(), &back].map(|r| r.arms[0].rcm_deviation * 1e3);
-        println!(
-            "{young_modulus_pa:.0} Pa: {mean:.2} N, swing {swing:.4} N, peak {peak:.2} N, {:.2} mm/s, rcm {a:.3} {b:.3} {c:.3} mm",
-            speed * 1e3
-        );
+        let [a, c] = [&free, &back].map(|r| r.arms[0].rcm_deviation * 1e3);
         assert!(mean > 0.02, "it presses: {mean} N at {young_modulus_pa} Pa");
         assert!(swing < 0.03 * mean + 0.01, "it swings by {swing} N around {mean} N at {young_modulus_pa} Pa");
         assert!(peak < 1.3 * mean + 0.1, "a peak of {peak} N, then {mean} N");
@@ -314,15 +307,6 @@ fn a_load_aside_leans_the_shaft_in_its_port() {
     };
     let rcm = |r: &CellReport| r.arms[0].rcm_deviation * 1e3;
     let load = under.arms[0].contact.length();
-    println!(
-        "{load:.2} N: rcm {:.3} {:.3} {:.3} mm, tip off by {:.3} {:.3} {:.3} mm",
-        rcm(&before),
-        rcm(&under),
-        rcm(&after),
-        tip(&before),
-        tip(&under),
-        tip(&after)
-    );
     assert!(load > 0.3, "{load} N");
     assert!(tip(&under) > tip(&before) || rcm(&under) > rcm(&before), "a loaded tip gives way");
     assert!(rcm(&under) < 3.0 && rcm(&after) < rcm(&before) + 0.1 && tip(&after) < tip(&before) + 0.2);
@@ -352,7 +336,6 @@ fn the_cutter_cuts_what_it_closes_on_and_parts_it_where_the_scene_says_so() {
             .iter()
             .filter_map(|e| if let CellEvent::Cut { pieces, .. } = e { Some(*pieces) } else { None })
             .collect();
-        println!("sever {sever}: {events:?}, jaw {:.3}", cell.observe()[1].measured.jaw());
         assert_eq!(pieces, [if sever { 2 } else { 1 }]);
         assert_eq!(cell.world().model.bodies().len(), if sever { 3 } else { 2 });
         let parted =

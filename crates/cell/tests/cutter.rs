@@ -59,7 +59,6 @@ fn a_tube_that_is_cut_through_falls_into_two_bodies() {
         let rest = world.model.bodies()[k].rest_positions().iter().sum::<DVec3>() / nodes.len() as f64;
         (world.state.centroid(&world.model, k, &nodes) - rest).dot(world.up)
     };
-    println!("the stump rises by {:.2} mm, what is held by {:.2} mm", rise(0) * 1e3, rise(1) * 1e3);
     assert_eq!(world.state.grasps.iter().map(|g| g.body).collect::<Vec<_>>(), [1]);
     assert!(rise(1) > 6e-3 && rise(0).abs() < 1e-3);
     assert_eq!(world.state.hash(), resect(MAX_ANGLE).0.state.hash());

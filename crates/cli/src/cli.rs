@@ -37,7 +37,6 @@ pub struct Cli {
     pub quiet: bool,
 }
 
-/// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Record a phantom, reconstruct it, lift its appendix, and open the report: no downloads, no
@@ -94,7 +93,6 @@ fn split(name: &str) -> Result<Split, String> {
     Split::named(name).ok_or_else(|| format!("the splits are {known}"))
 }
 
-/// Arguments of `demo`.
 #[derive(Debug, Args)]
 pub struct Demo {
     /// Folder for all results of the demo.
@@ -114,7 +112,6 @@ pub struct Demo {
     pub no_open: bool,
 }
 
-/// Arguments of `record`.
 #[derive(Debug, Args)]
 pub struct Record {
     /// The phantom: phantom-a (rabbit: cecum, three bowel segments, stomach, appendix), phantom-b
@@ -135,7 +132,6 @@ pub struct Record {
     pub sensor: SensorName,
 }
 
-/// Arguments of `inspect`.
 #[derive(Debug, Args)]
 pub struct Inspect {
     /// Recording: a folder with a recording.toml, a .bag or an .mcap file.
@@ -145,7 +141,6 @@ pub struct Inspect {
     pub template: bool,
 }
 
-/// Arguments of `segment`.
 #[derive(Debug, Args)]
 pub struct Segment {
     /// Recording; its .toml marks organs by `points` and instruments by `[[instrument]]`.
@@ -173,7 +168,6 @@ pub struct Sam {
     pub onnxruntime: Option<PathBuf>,
 }
 
-/// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
 pub struct Reconstruct {
     /// Recording: a folder with a recording.toml, or a .bag or .mcap file with an optional .toml of
@@ -216,7 +210,6 @@ pub struct Reconstruct {
     pub element_size: Option<f64>,
 }
 
-/// Arguments of `simulate`.
 #[derive(Debug, Args)]
 pub struct Simulate {
     /// Specimen folder, scene file, or built-in scene such as cell-a. In a scene, an arm of the
@@ -266,7 +259,6 @@ pub struct Simulate {
     pub output: PathBuf,
 }
 
-/// Tasks by name.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum Task {
     /// Settle, grasp, lift, hold, lower, open; with --sever, cut after the hold and lift further.

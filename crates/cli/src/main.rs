@@ -26,8 +26,8 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if progress.was_interrupted() => {
             match error {
-                trocar_studies::Error::Work(trocar_workflow::Error::Stopped { .. }) => eprintln!("{error}"),
-                trocar_studies::Error::Interrupted => eprintln!("interrupted; no partial output was left"),
+                trocar_workflow::Error::Stopped { .. } => eprintln!("{error}"),
+                trocar_workflow::Error::Interrupted => eprintln!("interrupted; no partial output was left"),
                 _ => eprintln!("interrupted; no partial output was left ({error})"),
             }
             ExitCode::from(INTERRUPTED)

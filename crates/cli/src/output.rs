@@ -38,24 +38,3 @@ pub fn line(text: &str) {
         _ => {}
     }
 }
-
-/// A table with its first column aligned left and the others right.
-pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
-    let mut widths: Vec<usize> = header.iter().map(|h| h.chars().count()).collect();
-    for row in rows {
-        for (w, cell) in widths.iter_mut().zip(row) {
-            *w = (*w).max(cell.chars().count());
-        }
-    }
-    let line = |cells: &mut dyn Iterator<Item = &str>| {
-        let mut out = String::new();
-        for (k, (cell, w)) in cells.zip(&widths).enumerate() {
-            let pad = " ".repeat(w - cell.chars().count());
-            out += &if k == 0 { format!("  {cell}{pad}") } else { format!("  {pad}{cell}") };
-        }
-        out
-    };
-    let mut lines = vec![line(&mut header.iter().copied())];
-    lines.extend(rows.iter().map(|row| line(&mut row.iter().map(String::as_str))));
-    lines.join("\n")
-}

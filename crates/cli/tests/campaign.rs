@@ -12,23 +12,11 @@ use std::time::{Duration, SystemTime};
 use tempfile::TempDir;
 use trocar_remote::{Array, Call, Loopback, LoopbackOptions, Map, Value};
 use trocar_scene::EpisodeRandom;
-use trocar_scene::{SpecimenSource, TaskName};
 use trocar_testing::tube;
 
 /// A coarse tube on disk, and a scene of it in which arms reach for `seconds`, without cameras.
 fn scene(folder: &Path, seconds: f64) -> PathBuf {
-    let specimen = folder.join("tube");
-    if !specimen.exists() {
-        tube::two_tubes(tube::ONE_END, 4e-3).write(&specimen).unwrap();
-    }
-    let mut scene = tube::resection();
-    scene.specimen = SpecimenSource { path: Some("tube".to_owned()), phantom: None, seed: 1 };
-    scene.task.name = TaskName::PortReach;
-    scene.task.episode_s = seconds;
-    scene.cameras.clear();
-    let file = folder.join(format!("reach-{seconds}.toml"));
-    std::fs::write(&file, scene.to_toml().unwrap()).unwrap();
-    file
+    tube::reach(folder, &format!("reach-{seconds}.toml"), seconds, &[])
 }
 
 fn evaluate(scene: &Path, output: &Path, more: &[&str]) -> Command {

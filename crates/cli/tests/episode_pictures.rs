@@ -5,7 +5,6 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use trocar_camera::ColorImage;
-use trocar_scene::{SpecimenSource, TaskName};
 use trocar_testing::tube;
 
 const SMALL: [&str; 4] = ["--size", "96x54", "--camera", "endoscope"];
@@ -21,14 +20,7 @@ fn said(output: &Output) -> serde_json::Value {
 
 /// An episode of half a second, in the folder `run`, whose specimen is the folder `tube`.
 fn episode(folder: &Path) -> PathBuf {
-    tube::two_tubes(tube::ONE_END, 4e-3).write(&folder.join("tube")).unwrap();
-    let mut scene = tube::resection();
-    scene.specimen = SpecimenSource { path: Some("tube".to_owned()), phantom: None, seed: 1 };
-    scene.task.name = TaskName::PortReach;
-    scene.task.episode_s = 0.5;
-    scene.cameras.retain(|c| c.name != "recording");
-    let file = folder.join("reach.toml");
-    std::fs::write(&file, scene.to_toml().unwrap()).unwrap();
+    let file = tube::reach(folder, "reach.toml", 0.5, &["endoscope", "d405"]);
     let run = folder.join("run");
     let (file, out) = (file.to_str().unwrap(), run.to_str().unwrap());
     said(&trocar(&["episode", file, "--policy", "random", "--seed", "3", "-o", out, "--json"]));

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use trocar_camera::{Camera, ColorImage, DepthImage};
 use trocar_recording::{OrganInfo, RecordingInfo, RecordingWriter};
-use trocar_specimen::{Material, Pins};
 
 /// Runs the command in `folder`, which must succeed and print one JSON object.
 fn trocar(folder: &Path, arguments: &[&str]) -> serde_json::Value {
@@ -132,11 +131,7 @@ fn a_moving_organ_is_warned_of() {
         organs: vec![OrganInfo {
             name: "mound".into(),
             polygon: vec![[30.0, 20.0], [66.0, 20.0], [66.0, 52.0], [30.0, 52.0]],
-            points: vec![],
-            points_outside: vec![],
-            base_px: None,
-            material: Material::default(),
-            pins: Pins::Band { share: 0.42 },
+            ..OrganInfo::default()
         }],
         ..RecordingInfo::of_log("mound".as_ref())
     };

@@ -7,7 +7,6 @@
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use tempfile::TempDir;
-use trocar_scene::{SpecimenSource, TaskName};
 use trocar_testing::tube;
 
 /// Runs the program in `folder`, without a terminal and without the user's settings.
@@ -27,7 +26,6 @@ fn check(name: &str, text: &str) {
     settings.bind(|| insta::assert_snapshot!(name, text));
 }
 
-/// The commands that the help of a command lists.
 fn commands(help: &str) -> Vec<String> {
     let listed = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
     let name = |line: &str| line.strip_prefix("  ").filter(|l| !l.starts_with(' ')).map(str::to_owned);
@@ -55,8 +53,7 @@ fn the_help_of_every_command() {
 fn inputs() -> TempDir {
     let here = TempDir::new().unwrap();
     let at = |name: &str| here.path().join(name);
-    tube::two_tubes(tube::ONE_END, 4e-3).write(&at("tube")).unwrap();
-    std::fs::write(at("reach.toml"), reach(0.5)).unwrap();
+    tube::reach(here.path(), "reach.toml", 0.5, &["endoscope"]);
     let scene = |more: &str| format!("name = 'mine'\n[specimen]\nphantom = 'phantom-a'\n{more}");
     std::fs::write(at("unit.toml"), scene("[safety]\nrcm_abort_mm = 0.005\n")).unwrap();
     std::fs::write(at("key.toml"), scene("[safety]\nrcm_abort = 5\n")).unwrap();
@@ -68,16 +65,6 @@ fn inputs() -> TempDir {
     std::fs::write(at("damaged.stl"), "solid nothing\nfacet").unwrap();
     std::fs::write(at("damaged.trocar"), "no episode").unwrap();
     here
-}
-
-/// A scene of the specimen `tube` in which arms reach for `seconds` before the endoscope.
-fn reach(seconds: f64) -> String {
-    let mut scene = tube::resection();
-    scene.specimen = SpecimenSource { path: Some("tube".to_owned()), phantom: None, seed: 1 };
-    scene.task.name = TaskName::PortReach;
-    scene.task.episode_s = seconds;
-    scene.cameras.retain(|c| c.name == "endoscope");
-    scene.to_toml().unwrap()
 }
 
 /// Paths and error texts of other systems differ from those of Unix.

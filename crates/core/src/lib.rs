@@ -12,7 +12,7 @@ mod random;
 mod wrench;
 
 pub use pose::Pose;
-pub use progress::{Progress, Silent, StopAfter};
+pub use progress::{Progress, Quiet, Silent, StopAfter};
 pub use random::{Random, RandomSequence, mix, standard_normal, unit};
 pub use wrench::Wrench;
 

@@ -45,6 +45,18 @@ impl Progress for Silent {
     }
 }
 
+/// Reports nothing and passes the request to stop on, for parts of work that has its own progress.
+pub struct Quiet<'a>(pub &'a dyn Progress);
+
+impl Progress for Quiet<'_> {
+    fn begin(&self, _stage: &str, _total: u64) {}
+    fn advance(&self, _units: u64) {}
+    fn end(&self) {}
+    fn interrupted(&self) -> bool {
+        self.0.interrupted()
+    }
+}
+
 /// Reports nothing and asks to stop after a number of units of work, over all stages together.
 #[derive(Debug)]
 pub struct StopAfter {

@@ -342,7 +342,6 @@ mod tests {
         let body = cylinder(0.0021);
         let axis = OrganAxis::of(&body, DVec3::new(-0.05, 0.0, 0.0)).unwrap();
         let worst = body.vertices.iter().zip(&axis.s).map(|(p, s)| (s - (p.x + 0.04) / 0.08).abs()).fold(0.0, f64::max);
-        println!("cylinder: worst error of s {worst:.4}, length {:.5} m", axis.length);
         assert!(worst < 0.02, "{worst}");
         assert!((axis.length - 0.08).abs() < 0.001, "{}", axis.length);
         assert!(axis.point_at(0.0).distance(DVec3::X * -0.04) < 0.001);
@@ -372,7 +371,6 @@ mod tests {
             .zip(&axis.s)
             .map(|(p, s)| (s - p.y.max(0.0).atan2(p.x) / PI).abs())
             .fold(0.0, f64::max);
-        println!("half ring: worst error of s {worst:.4}, length {:.5} m of {:.5}", axis.length, PI * 0.035);
         assert!(worst < 0.02, "{worst}");
         assert!((axis.length / (PI * 0.035) - 1.0).abs() < 0.02, "{}", axis.length);
         for k in 0..=8 {
@@ -393,7 +391,6 @@ mod tests {
         assert!((axis.length - 0.076).abs() < 0.0015, "{}", axis.length);
         let errors = body.vertices.iter().zip(&axis.s).map(|(p, s)| (s - (p.x + 0.038) / 0.076).abs());
         let worst = errors.fold(0.0, f64::max);
-        println!("capsule: worst error of s {worst:.4}");
         assert!(worst < 0.05, "{worst}");
     }
 
@@ -424,7 +421,6 @@ mod tests {
             .filter(|(p, _)| near(p))
             .map(|(p, s)| (s - (p.x + 0.04) / 0.08).abs())
             .fold(0.0, f64::max);
-        println!("cone: worst error of s near the axis {worst:.4}");
         assert!(worst < 0.03, "{worst}");
     }
 

@@ -141,17 +141,11 @@ fn closest_on_triangle(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{LatticeMesher, SignedDistance};
-
-    struct Ball;
-    impl SignedDistance for Ball {
-        fn distance(&self, p: DVec3) -> f64 {
-            p.length() - 0.03
-        }
-    }
+    use crate::LatticeMesher;
+    use crate::shapes::Ball;
 
     fn body(cell: f64) -> TetMesh {
-        LatticeMesher::uniform(cell).mesh_shape(&Ball, (DVec3::splat(-0.03), DVec3::splat(0.03))).unwrap()
+        LatticeMesher::uniform(cell).mesh_shape(&Ball(0.03), (DVec3::splat(-0.03), DVec3::splat(0.03))).unwrap()
     }
 
     /// Evenly distributed points on a sphere, as a surface without triangles.

@@ -8,7 +8,6 @@ mod common;
 use common::{Shape, check_conforming};
 use glam::{DQuat, DVec3};
 use std::path::PathBuf;
-use std::time::Instant;
 use trocar_core::Random;
 use trocar_geometry::io::{Unit, read_surface};
 use trocar_geometry::{LatticeMesher, Mesher, SignedDistance, TetMesh, TetQuality, TriMesh, repair};
@@ -105,7 +104,6 @@ fn every_shape_gives_a_valid_mesh_and_keeps_its_surface() {
             assert!(graded.tets.len() <= *counts.last().unwrap());
             counts.push(graded.tets.len());
         }
-        println!("{name:>16}: tets with leaves of at most 1, 2 and 64 cells {counts:?}");
         most = most.max(counts[0] as f64 / counts[2] as f64);
     }
     assert!(most > 2.5, "no shape has far fewer elements: {most}");
@@ -136,7 +134,6 @@ fn the_cost_is_proportional_to_the_surface() {
         (mesh.tets.len() as f64, evaluations.into_inner() as f64)
     };
     let (coarse, fine) = (cost(0.003), cost(0.0015));
-    println!("tets {} and {}, evaluations {} and {}", coarse.0, fine.0, coarse.1, fine.1);
     assert!(fine.0 < 5.0 * coarse.0 && fine.1 < 5.0 * coarse.1);
 }
 
@@ -181,7 +178,6 @@ fn the_cell_matches_the_budget() {
     for budget in [5_000, 50_000, 100_000] {
         let (mesher, mesh) = LatticeMesher::fit(&ball, 1e-4, budget).unwrap();
         let part = mesh.tets.len() as f64 / budget as f64;
-        println!("{budget}: {} with cells of {:.2} mm; {}", mesh.tets.len(), 1e3 * mesher.cell, mesher.describe());
         assert!((0.8..1.1).contains(&part));
         assert!(mesher.mesh(&ball).unwrap() == mesh);
     }
@@ -205,20 +201,9 @@ fn organs_give_valid_meshes() {
             continue;
         }
         let (organ, _) = repair(&read_surface(&path, Unit::Millimetre).unwrap()).unwrap();
-        let started = Instant::now();
         let (mesher, mesh) = LatticeMesher::fit(&organ, 1e-4, 50_834).unwrap();
-        let took = started.elapsed().as_secs_f64();
-        let quality = check(file, &mesh);
+        check(file, &mesh);
         let uniform = LatticeMesher::uniform(mesher.cell).mesh(&organ).unwrap();
-        println!(
-            "{file}: cells of {:.2} mm, {} tets ({} uniform), {took:.2} s, dihedral {:.2} (median {:.1}) to {:.1}",
-            1e3 * mesher.cell,
-            mesh.tets.len(),
-            uniform.tets.len(),
-            quality.min_dihedral_deg,
-            quality.median_min_dihedral_deg,
-            quality.max_dihedral_deg
-        );
         assert!((0.9..1.1).contains(&(mesh.tets.len() as f64 / 50_834.0)));
         assert!(surface_of(&uniform) == surface_of(&mesh));
     }

@@ -5,7 +5,6 @@ mod common;
 use common::{Shape, check_conforming};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
-use std::time::Instant;
 use trocar_geometry::{Error, LatticeMesher, SignedDistance, TetQuality};
 
 fn boxed(
@@ -66,21 +65,9 @@ fn every_shape_gives_a_valid_body() {
     for (name, half, shape) in shapes() {
         for cell in [0.0031, 0.0019] {
             let mesher = LatticeMesher::uniform(cell);
-            let started = Instant::now();
             let mesh = mesher.mesh_shape(shape.as_ref(), (-half, half)).unwrap();
-            let took = started.elapsed();
             let quality = TetQuality::of(&mesh);
             let touching = check_conforming(&mesh);
-            println!(
-                "{name:>20} cell {:.1} mm: {:6} tets {:6} nodes, dihedral {:.2} (median {:.1}) to {:.2}, {touching} pinched nodes, {:.0} ms",
-                cell * 1e3,
-                mesh.tets.len(),
-                mesh.vertices.len(),
-                quality.min_dihedral_deg,
-                quality.median_min_dihedral_deg,
-                quality.max_dihedral_deg,
-                took.as_secs_f64() * 1e3
-            );
             assert!(quality.min_dihedral_deg > 10.7 && quality.max_dihedral_deg < 165.0, "{name}: {quality:?}");
             assert_eq!(quality.inverted, 0, "{name}");
             let used: std::collections::BTreeSet<u32> = mesh.tets.iter().flatten().copied().collect();
@@ -103,7 +90,6 @@ fn the_volume_of_a_sphere_converges_at_second_order() {
         let mesh = LatticeMesher::uniform(cell).mesh_shape(&Shape(|p| p.length() - radius), cube(radius)).unwrap();
         (truth - mesh.volume()) / truth
     });
-    println!("relative volume errors {errors:?}");
     assert!(errors[2] > 0.0 && errors[2] < 1e-3, "nodes on a convex surface enclose less");
     for pair in errors.windows(2) {
         let order = (pair[0] / pair[1]).log2();

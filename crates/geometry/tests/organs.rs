@@ -34,10 +34,8 @@ fn every_organ_becomes_watertight_and_keeps_its_volume() {
     for (file, volume, tolerance, rebuilt) in ORGANS {
         let Some(path) = shared(&format!("data/{file}")) else { return };
         let mesh = read_surface(&path, Unit::Millimetre).unwrap();
-        let start = std::time::Instant::now();
         let (repaired, report) = repair(&mesh).unwrap_or_else(|e| panic!("{file}: {e}"));
         let got = repaired.volume() * 1e6;
-        println!("{file}: {got:.2} cm3 of {volume}, {:.2} s, {report:?}", start.elapsed().as_secs_f64());
         assert!(repaired.is_watertight(), "{file}");
         assert_eq!(repaired.components().1, 1, "{file}");
         assert!((got / volume - 1.0).abs() < tolerance, "{file}: {got} cm3, not {volume}");
@@ -49,21 +47,9 @@ fn every_organ_becomes_watertight_and_keeps_its_volume() {
 fn a_liver_keeps_its_shape_through_a_grid() {
     let Some(path) = shared("data/openhelp/Liver.stl") else { return };
     let (liver, _) = repair(&read_surface(&path, Unit::Millimetre).unwrap()).unwrap();
-    let start = std::time::Instant::now();
     let field = MeshDistance::new(&liver).unwrap();
-    let built = start.elapsed().as_secs_f64();
-    let start = std::time::Instant::now();
     let grid = sample_distance(&field, liver.bounds().unwrap(), 1.5e-3);
-    let sampled = start.elapsed().as_secs_f64();
-    let start = std::time::Instant::now();
     let surface = isosurface(&grid, 0.0);
-    println!(
-        "{} triangles: tree {built:.3} s; {:?} points: {sampled:.2} s; {} triangles out: {:.2} s",
-        liver.triangles.len(),
-        grid.dims,
-        surface.triangles.len(),
-        start.elapsed().as_secs_f64()
-    );
     assert!(surface.is_watertight());
     assert!((surface.largest_component().volume() / liver.volume() - 1.0).abs() < 0.005);
     let worst = surface.vertices.iter().map(|&v| field.distance(v).abs()).fold(0.0, f64::max);
@@ -84,7 +70,6 @@ fn meshes_written_by_meshio_are_read() {
         let mesh = read_msh(&path).unwrap();
         assert!(mesh.tets.len() > 1000, "{organ}");
         assert!(mesh.vertices.iter().all(|v| v.length() < 1.0), "{organ} in metres");
-        println!("{organ}: {} nodes, {} tets", mesh.vertices.len(), mesh.tets.len());
     }
 }
 

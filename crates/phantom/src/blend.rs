@@ -88,7 +88,6 @@ impl Blend {
         })
     }
 
-    /// The tube in the groove.
     pub fn groove(&self) -> Option<&Tube> {
         self.spec.groove.as_ref().map(|(tube, _)| tube)
     }

@@ -53,7 +53,6 @@ impl Body {
         }
     }
 
-    /// Local coordinates of `p`.
     pub fn local(&self, p: DVec3) -> LocalPoint {
         match self {
             Self::Tube(tube) => tube.local(p),

@@ -11,7 +11,7 @@ use std::path::Path;
 use trocar_camera::Camera;
 use trocar_core::Progress;
 use trocar_geometry::io::write_ply;
-use trocar_recording::{InstrumentRule, OrganInfo, RecordingInfo, RecordingWriter};
+use trocar_recording::{OrganInfo, RecordingInfo, RecordingWriter};
 
 /// File names have six digits.
 const MAX_FRAMES: usize = 1_000_000;
@@ -119,28 +119,20 @@ fn info(spec: &PhantomSpec, options: &RecordOptions, camera: &Camera, anatomy: &
     let pixel = |p| camera.project(p).map(|q| [(q.x * 10.0).round() / 10.0, (q.y * 10.0).round() / 10.0]);
     let organ = |o: &Organ| OrganInfo {
         name: o.name.to_owned(),
-        polygon: Vec::new(),
-        points: Vec::new(),
-        points_outside: Vec::new(),
         base_px: pixel(o.body.base()),
         material: o.material(spec),
         pins: o.pins(),
+        ..OrganInfo::default()
     };
     RecordingInfo {
         name: spec.name.to_owned(),
         rate_hz: Some(RATE_HZ),
         depth_scale_m: Some(sensor::DEPTH_SCALE),
         up: [0.0, 0.0, -1.0],
-        depth_offset_px: [0.0; 2],
-        depth_max_m: None,
-        instruments: InstrumentRule::Masks,
         note: format!("synthetic, seed {seed}{noise}; the truth is in truth/; materials are the paper's"),
-        source: None,
         camera: Some(*camera),
-        depth_camera: None,
-        depth_to_color: None,
-        followed: Vec::new(),
         organs: anatomy.organs.iter().map(organ).collect(),
+        ..RecordingInfo::default()
     }
 }
 

@@ -126,7 +126,6 @@ impl Tube {
         points
     }
 
-    /// Local coordinates of `p`.
     pub fn local(&self, p: DVec3) -> LocalPoint {
         let (s, offset) = self.project(p);
         LocalPoint { s, angle: offset.y.atan2(offset.x) }

@@ -8,9 +8,6 @@ use trocar_geometry::{
 use trocar_specimen::OrganFacts;
 
 /// Fills a closed surface with tetrahedra and measures the result.
-///
-/// # Errors
-/// When the mesher fails or leaves an element without volume.
 pub fn fill_with_tets(organ: &str, surface: &TriMesh, settings: &Settings) -> Result<(TetMesh, OrganFacts)> {
     let wrong = |reason: String| Error::Organ { organ: organ.to_owned(), reason };
     let body = fill(surface, settings).map_err(|e| wrong(format!("it cannot be filled with tetrahedra: {e}")))?;

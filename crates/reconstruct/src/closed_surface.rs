@@ -150,7 +150,6 @@ mod tests {
         let made = thickness(&sphere.0, &sphere.1, &camera, BackRule::Rounded);
         let mesh = closed_surface(&sphere.0, &made.h, &sphere.1, &camera);
         let ratio = mesh.volume() / (4.0 / 3.0 * std::f64::consts::PI * r.powi(3));
-        println!("sphere {ratio:.4}, R {:.4}", made.radius / r);
         assert!(mesh.is_watertight() && (0.90..1.01).contains(&ratio), "sphere: {ratio}");
 
         let (r, half) = (0.006, 0.05);
@@ -164,7 +163,6 @@ mod tests {
         let mesh = closed_surface(&cylinder.0, &made.h, &cylinder.1, &camera);
         // The ends become rounded like quarter tori: a flat end loses at most (pi - 8/3) r^3.
         let ratio = mesh.volume() / (std::f64::consts::PI * r * r * 2.0 * half);
-        println!("cylinder {ratio:.4}, R {:.4}", made.radius / r);
         assert!(mesh.is_watertight() && (0.94..1.02).contains(&ratio), "cylinder: {ratio}");
     }
     /// An ellipsoid lying flat: the paper's round back makes it twice too thick, the fitted one
@@ -185,7 +183,6 @@ mod tests {
             closed_surface(&seen.0, &made.h, &seen.1, &camera).volume() / truth
         };
         let (rounded, fitted) = (ratio(BackRule::Rounded), ratio(BackRule::Fitted));
-        println!("flat: rounded {rounded:.3}, fitted {fitted:.3}");
         assert!(rounded > 2.0 && (0.9..1.1).contains(&fitted), "{rounded}, {fitted}");
     }
 }

@@ -14,6 +14,7 @@ use trocar_recording::{Packet, Recording, RgbdFrame};
 use xxhash_rust::xxh3::Xxh3;
 
 /// The scene behind the instruments, from a window of frames.
+#[derive(Clone, Debug)]
 pub struct Composite {
     /// The centre frame's colour.
     pub input: ColorImage,
@@ -84,9 +85,6 @@ struct Scratch {
 
 /// Builds the composite. It takes 6 bytes per pixel and frame of the window. Broken frames are left
 /// out, with a note.
-///
-/// # Errors
-/// A centre outside the recording, too few whole frames, or an interruption.
 pub fn composite(
     recording: &Recording,
     settings: &Settings,

@@ -141,7 +141,6 @@ mod tests {
         let after = errors.iter().map(|e| e.abs()).sum::<f64>() / errors.len() as f64;
         errors.sort_by(f64::total_cmp);
         let median = errors[errors.len() / 2];
-        println!("mean |error| {:.3} -> {:.3} mm, median {:.4} mm", before * 1e3, after * 1e3, median * 1e3);
         assert!(after < 0.75 * before);
         assert!(median.abs() < 0.03e-3);
     }

@@ -26,7 +26,7 @@ mod settings;
 mod thickness;
 
 pub use check::{DepthCheck, check as depth_error};
-pub use composite::CompositeTimes;
+pub use composite::{Composite, CompositeTimes};
 pub use error::{Error, Result};
 pub use from_surface::from_surface;
 pub use pipeline::{OrganView, Reconstruction, reconstruct};

@@ -14,7 +14,6 @@ pub struct OrganSegmenters {
     sam: Option<Sam2>,
 }
 
-/// The segmentation target of an organ.
 fn target(organ: &OrganInfo) -> Target {
     Target {
         name: organ.name.clone(),
@@ -33,10 +32,6 @@ fn only_points(organ: &OrganInfo, masks: &Path) -> bool {
 impl OrganSegmenters {
     /// Opens the segmenters of the organs of `recording` and checks that each organ can be found,
     /// so that a missing mask is not noticed after minutes of work.
-    ///
-    /// # Errors
-    /// An organ without mask, outline or points; a mask of another size, or empty; points without
-    /// SAM 2.1.
     pub fn open(recording: &Recording, settings: &Settings) -> Result<Self> {
         let folder = recording.dir().join("masks");
         let organs = &recording.info.organs;
@@ -59,10 +54,6 @@ impl OrganSegmenters {
         Ok(segmenters)
     }
 
-    /// The mask of `organ` in the composite `color`.
-    ///
-    /// # Errors
-    /// When the mask is missing, of another size than the images, or empty.
     pub fn mask(&self, organ: &OrganInfo, color: &ColorImage) -> Result<Mask> {
         let wrong = |reason: String| Error::Organ { organ: organ.name.clone(), reason };
         let file = self.files.folder.join(format!("{}.png", organ.name));
@@ -92,9 +83,6 @@ impl OrganSegmenters {
 
 /// Pixels of a frame that instruments cover, by the recording's rule; `None` for the recording's
 /// own masks.
-///
-/// # Errors
-/// When the detector cannot work on the frame.
 pub fn instruments(rule: InstrumentRule, frame: &RgbdFrame, name: &str) -> Result<Option<Mask>> {
     match rule {
         InstrumentRule::Masks => Ok(None),

@@ -42,9 +42,6 @@ pub struct Closed {
 }
 
 /// Closes the organ inside `mask`. Adds notes for the user to `notes`.
-///
-/// # Errors
-/// When no depth was measured inside the mask, or no closed surface results.
 pub fn close(info: &OrganInfo, mut mask: Mask, view: &View<'_>, notes: &mut Vec<String>) -> Result<Closed> {
     let View { background, ref camera, depth_scale, back: back_rule, surface: rule } = *view;
     let name = &info.name;
@@ -134,7 +131,6 @@ mod tests {
     use super::*;
     use crate::composite::CompositeTimes;
     use trocar_camera::{ColorImage, DepthImage};
-    use trocar_specimen::{Material, Pins};
 
     /// An ellipsoid with half axes `a` (m) and centre `c` (m), seen by the D405 at 1 mm
     /// quantisation.
@@ -166,15 +162,7 @@ mod tests {
             hash: 0,
             times: CompositeTimes::default(),
         };
-        let info = OrganInfo {
-            name: "organ".into(),
-            polygon: vec![],
-            points: vec![],
-            points_outside: vec![],
-            base_px: None,
-            material: Material::default(),
-            pins: Pins::None,
-        };
+        let info = OrganInfo { name: "organ".into(), ..OrganInfo::default() };
         let surface = SurfaceRule::SignedDistance;
         let view = View { background: &background, camera, depth_scale: 1e-3, back: BackRule::Rounded, surface };
         close(&info, mask, &view, &mut Vec::new()).unwrap()
@@ -190,13 +178,6 @@ mod tests {
         for (name, c, a) in cases {
             let Closed { surface, check, .. } = closed(c, a);
             let ratio = surface.volume() / (4.0 / 3.0 * std::f64::consts::PI * a.x * a.y * a.z);
-            println!(
-                "{name}: median {:.3} mm, signed {:.3} mm, covered {:.3}, volume x {ratio:.3}, {} triangles",
-                1e3 * check.median_absolute,
-                1e3 * check.median_signed,
-                check.covered,
-                surface.triangles.len()
-            );
             assert!(surface.is_watertight());
             assert!(check.median_absolute < 0.5e-3 && check.median_signed.abs() < 0.15e-3, "{name}");
             assert!(check.covered > 0.95, "{name}");

@@ -1,12 +1,12 @@
 //! The stages of the reconstruction in order.
 
 use crate::body::fill_with_tets;
-use crate::composite::{Composite, CompositeTimes, composite};
+use crate::composite::{Composite, composite};
 use crate::masks::OrganSegmenters;
 use crate::motion::WARN_SHARE;
 use crate::organ::{Closed, View, close};
 use crate::{Error, Result, Settings};
-use trocar_camera::{ColorImage, DepthImage, Mask};
+use trocar_camera::Mask;
 use trocar_core::{Pose, Progress};
 use trocar_recording::{OrganInfo, Recording};
 use trocar_specimen::{Organ, Provenance, Specimen};
@@ -32,24 +32,8 @@ pub struct OrganView {
 pub struct Reconstruction {
     /// The result.
     pub specimen: Specimen,
-    /// The window's centre frame, as recorded.
-    pub input: ColorImage,
-    /// Instruments in that frame.
-    pub instruments: Mask,
-    /// The composite's colour.
-    pub background: ColorImage,
-    /// The composite's depth.
-    pub depth: DepthImage,
-    /// Frames the composite used.
-    pub frames_used: usize,
-    /// Share of the image under the instruments of the centre frame that the composite recovered.
-    pub recovered_share: f64,
-    /// Share of pixels with composite depth.
-    pub coverage: f64,
-    /// Median over pixels of the range between the 10th and 90th percentile of depth (m).
-    pub depth_range_median: f64,
-    /// Times of the parts of the composite.
-    pub times: CompositeTimes,
+    /// The scene behind the instruments.
+    pub composite: Composite,
     /// Per organ, in the specimen's order.
     pub organs: Vec<OrganView>,
     /// Warnings that the result may be wrong (organs that move during the window), one sentence
@@ -144,15 +128,7 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
     };
     Ok(Reconstruction {
         specimen,
-        input: background.input,
-        instruments: background.instruments,
-        background: background.color,
-        depth: background.depth,
-        frames_used: background.frames_used,
-        recovered_share: background.recovered_share,
-        coverage: background.coverage,
-        depth_range_median: background.depth_range_median,
-        times: background.times,
+        composite: background,
         warnings: motion_warning(&views, settings.window).into_iter().collect(),
         organs: views,
         notes,

@@ -12,9 +12,6 @@ const SMOOTHING_ITERATIONS: usize = 10;
 /// Resamples `raw`, which is closed but as rough as its pixels: signed distance on a grid, surface
 /// at 0, largest component, Taubin smoothing. The grid is the paper's 1.5 mm, finer where the
 /// organ's `radius` (m) needs it.
-///
-/// # Errors
-/// When no closed surface results.
 pub fn resample(organ: &str, raw: &TriMesh, radius: f64) -> Result<TriMesh> {
     let wrong = |reason: &str| Error::Organ { organ: organ.to_owned(), reason: reason.to_owned() };
     let bounds = raw.bounds().ok_or_else(|| wrong("its surface is empty"))?;
@@ -26,9 +23,6 @@ pub fn resample(organ: &str, raw: &TriMesh, radius: f64) -> Result<TriMesh> {
 }
 
 /// The largest component of a voxel surface, smoothed as in the paper, and checked to be closed.
-///
-/// # Errors
-/// When no closed surface remains.
 pub fn tidy(organ: &str, rough: &TriMesh) -> Result<TriMesh> {
     let wrong = |reason: &str| Error::Organ { organ: organ.to_owned(), reason: reason.to_owned() };
     let mut surface = rough.largest_component();

@@ -66,7 +66,7 @@ fn metal_is_found_where_the_recording_says_so() {
     info.instruments = trocar_recording::InstrumentRule::None;
     let (_root, dir) = recording(&info);
     let made = reconstruct(&Recording::open(&dir).unwrap(), &Settings::default(), &Silent).unwrap();
-    assert_eq!(made.instruments.count(), 0, "the masks are there, but the recording says none");
+    assert_eq!(made.composite.instruments.count(), 0, "the masks are there, but the recording says none");
     let toml = dir.join("recording.toml");
     let text = fs::read_to_string(&toml).unwrap().replace("instruments = \"none\"", "instruments = \"metal\"");
     fs::write(&toml, text).unwrap();
@@ -85,7 +85,7 @@ fn broken_frames_are_left_out_with_a_note() {
     }
     let made =
         reconstruct(&Recording::open(&dir).unwrap(), &Settings { stride: 1, ..Settings::default() }, &Silent).unwrap();
-    assert_eq!(made.frames_used, 10);
+    assert_eq!(made.composite.frames_used, 10);
     let noted = made.notes.iter().any(|n| n.contains("2 of 12 frames are broken") && n.contains("depth/000002.png"));
     assert!(noted, "{:?}", made.notes);
 }

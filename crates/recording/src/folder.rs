@@ -17,9 +17,6 @@ pub struct Folder {
 impl Folder {
     /// Lists the frames of the recording folder `dir`, whose depth has the unit `depth_scale_m`
     /// (m).
-    ///
-    /// # Errors
-    /// Names the missing file or folder.
     pub fn open(dir: &Path, depth_scale_m: f64) -> Result<Self> {
         let FrameList { frames, notes } = list_frames(dir)?;
         Ok(Self { frames, notes, depth_scale_m })

@@ -6,7 +6,6 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
-/// The files of one frame.
 #[derive(Clone, Debug)]
 pub struct FrameFiles {
     /// Colour; absent in a recording of depth alone.
@@ -38,9 +37,6 @@ struct Row {
 }
 
 /// Lists the frames of the recording folder `dir`.
-///
-/// # Errors
-/// When there is no depth folder or no frame, or when `frames.csv` is invalid.
 pub fn list_frames(dir: &Path) -> Result<FrameList> {
     let index = dir.join("frames.csv");
     let list = if index.is_file() { from_csv(dir, &index)? } else { from_folders(dir)? };

@@ -12,7 +12,7 @@ pub(crate) const MARKER: &str = "recording.toml";
 
 /// Facts of a recording. Cameras and depth scale may be left out where a bag or MCAP file has them;
 /// given ones override the file's.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecordingInfo {
     /// Name of the recording.
@@ -149,7 +149,7 @@ impl DepthToColor {
 }
 
 /// One organ of a recording.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OrganInfo {
     /// Name; its mask is `masks/<name>.png` unless `polygon` or `points` is given.
@@ -171,13 +171,8 @@ pub struct OrganInfo {
     #[serde(default)]
     pub material: Material,
     /// Pins; the lowest 42% of the nodes when absent.
-    #[serde(default = "default_pins")]
+    #[serde(default)]
     pub pins: Pins,
-}
-
-/// The paper's share of pinned nodes (section IV-B, about 42%).
-fn default_pins() -> Pins {
-    Pins::Band { share: 0.42 }
 }
 
 impl RecordingInfo {
@@ -185,21 +180,11 @@ impl RecordingInfo {
     pub fn of_log(path: &Path) -> Self {
         Self {
             name: path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
-            rate_hz: None,
-            depth_scale_m: None,
             up: [0.0, 0.0, -1.0],
-            depth_offset_px: [0.0; 2],
-            depth_max_m: None,
-            instruments: InstrumentRule::default(),
-            note: String::new(),
             source: path
                 .file_name()
                 .map(|n| SourceInfo { file: n.to_string_lossy().into_owned(), ..SourceInfo::default() }),
-            camera: None,
-            depth_camera: None,
-            depth_to_color: None,
-            followed: Vec::new(),
-            organs: Vec::new(),
+            ..Self::default()
         }
     }
 

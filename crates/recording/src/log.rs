@@ -50,9 +50,6 @@ pub struct LogCameras {
 impl Log {
     /// Opens the log `source` of the folder `dir`. `depth_scale_m` (m) overrides the log's unit of
     /// depth.
-    ///
-    /// # Errors
-    /// Names the file; lists the topics when colour or depth is not among them.
     pub fn open(dir: &Path, source: &SourceInfo, depth_scale_m: Option<f64>) -> Result<(Self, LogCameras)> {
         let path = dir.join(&source.file);
         let log = messages::open(&path)?;

@@ -127,7 +127,6 @@ mod tests {
             }
         }
         // One depth pixel is 7 mm wide at half a metre, and the plane rises 22 mm over 100.
-        println!("worst {:.2} mm, {holes} holes", 1e3 * worst);
         assert!(worst < 1e-4, "{worst}");
         assert_eq!(holes, 0);
     }

@@ -5,7 +5,6 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::Ranged;
 use std::ops::Range;
 
-/// An axis with its ticks.
 pub struct Axis {
     inner: RangedCoordf64,
     ticks: Vec<f64>,
@@ -112,7 +111,6 @@ pub fn log_label(exponent: f64) -> String {
     if multiple == 1.0 { power } else { format!("{multiple}\u{b7}{power}") }
 }
 
-/// A whole power of ten.
 fn power_of_ten(exponent: f64) -> String {
     let digit = |c: char| match c {
         '-' => '\u{207b}',

@@ -35,6 +35,9 @@ enum Block {
     Table(Table),
 }
 
+/// A column of a table: its name, units in round brackets, and its cell of a row.
+pub type Column<'a, T> = (&'a str, &'a dyn Fn(&T) -> String);
+
 /// A table of plain texts.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
@@ -49,19 +52,25 @@ impl Table {
         Self { head: head.into_iter().map(Into::into).collect(), rows, only_page: false }
     }
 
+    /// A table of `rows` by columns.
+    pub fn of<T>(rows: impl IntoIterator<Item = T>, columns: &[Column<'_, T>]) -> Self {
+        let cells = |row| columns.iter().map(|(_, cell)| cell(&row)).collect();
+        Self::new(columns.iter().map(|(name, _)| *name), rows.into_iter().map(cells).collect())
+    }
+
     /// The same table on the page only, for long tables.
     #[must_use]
     pub fn on_page_only(self) -> Self {
         Self { only_page: true, ..self }
     }
 
-    fn html(&self) -> String {
-        let head: Vec<&str> = self.head.iter().map(String::as_str).collect();
-        table::plain(&head, &self.rows)
+    /// The HTML for a page.
+    pub fn html(&self) -> String {
+        table::plain(&self.head, &self.rows)
     }
 
-    /// Aligned columns: the first left, the others right.
-    fn text(&self) -> String {
+    /// Lines for a terminal in aligned columns: the first left, the others right.
+    pub fn text(&self) -> String {
         let cells = |row: &[String]| row.iter().map(|c| plain(c)).collect::<Vec<_>>();
         let lines: Vec<Vec<String>> =
             std::iter::once(self.head.as_slice()).chain(self.rows.iter().map(Vec::as_slice)).map(cells).collect();
@@ -140,7 +149,7 @@ impl Section {
     /// # Errors
     /// A picture whose number of pixels differs from its size.
     pub fn picture(self, picture: &ColorImage, alt: &str, caption: &str) -> Result<Self> {
-        Ok(self.figure(Columns::Two, page::figure(&figures::img(picture, alt)?, caption)))
+        Ok(self.figure(Columns::Two, figures::figure(picture, alt, caption)?))
     }
 
     /// A figure (HTML) in a grid of `columns`.

@@ -43,6 +43,14 @@ pub fn img(picture: &ColorImage, alt: &str) -> Result<String> {
     Ok(img_of_bytes(kind, &bytes, width as usize, height as usize, alt))
 }
 
+/// A picture above its caption (HTML), as a `<figure>`; `alt` is plain text.
+///
+/// # Errors
+/// As [`img`].
+pub fn figure(picture: &ColorImage, alt: &str, caption: &str) -> Result<String> {
+    Ok(page::figure(&img(picture, alt)?, caption))
+}
+
 /// An `<img>` of an encoded picture of type `image/{kind}`.
 pub fn img_of_bytes(kind: &str, bytes: &[u8], width: usize, height: usize, alt: &str) -> String {
     format!(

@@ -29,9 +29,19 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
+/// A number with fixed decimals; a dash if there is none.
+pub fn or_dash(value: Option<f64>, decimals: usize) -> String {
+    fixed(value.unwrap_or(f64::NAN), decimals)
+}
+
 /// A share as a percentage.
 pub fn percent(share: f64, decimals: usize) -> String {
     format!("{}\u{202f}%", fixed(100.0 * share, decimals))
+}
+
+/// "yes" or "no".
+pub fn yes_or_no(value: bool) -> String {
+    if value { "yes" } else { "no" }.to_owned()
 }
 
 /// A cell with more characters than this is a sentence. Its column gets room to be read in a table
@@ -39,17 +49,15 @@ pub fn percent(share: f64, decimals: usize) -> String {
 const MAX_SHORT_CELL: usize = 40;
 
 /// An HTML table of plain texts.
-pub fn plain(head: &[&str], rows: &[Vec<String>]) -> String {
-    let cells = |tag: &str, texts: &mut dyn Iterator<Item = &str>| {
+pub(crate) fn plain(head: &[String], rows: &[Vec<String>]) -> String {
+    let cells = |tag: &str, texts: &[String]| {
         let class = |t: &str| if t.chars().count() > MAX_SHORT_CELL { " class=\"long\"" } else { "" };
-        texts.map(|t| format!("<{tag}{}>{}</{tag}>", class(t), page::escape(t))).collect::<String>()
+        texts.iter().map(|t| format!("<{tag}{}>{}</{tag}>", class(t), page::escape(t))).collect::<String>()
     };
-    let mut out = format!(
-        "<div class=\"wide\"><table class=\"plain\"><thead><tr>{}</tr></thead><tbody>\n",
-        cells("th", &mut head.iter().copied())
-    );
+    let mut out =
+        format!("<div class=\"wide\"><table class=\"plain\"><thead><tr>{}</tr></thead><tbody>\n", cells("th", head));
     for row in rows {
-        let _ = writeln!(out, "<tr>{}</tr>", cells("td", &mut row.iter().map(String::as_str)));
+        let _ = writeln!(out, "<tr>{}</tr>", cells("td", row));
     }
     out.push_str("</tbody></table></div>\n");
     out
@@ -62,7 +70,7 @@ mod tests {
     #[test]
     fn sentences_get_room() {
         let why = "empty jaws: they closed on nothing at 3.0 s, 1 mm from the appendix".to_owned();
-        let html = plain(&["Held", "Remarks"], &[vec!["no".to_owned(), why]]);
+        let html = plain(&["Held".to_owned(), "Remarks".to_owned()], &[vec!["no".to_owned(), why]]);
         assert!(html.contains("<td>no</td><td class=\"long\">empty jaws"), "{html}");
     }
 

@@ -31,7 +31,6 @@ fn friction_holds_without_creep() {
     let torque = believed.gravity_torque(&q);
     let missing =
         arm.gravity_torque(&q).iter().zip(torque.iter()).map(|(a, b)| a - b).fold(0.0, |m: f64, x| m.max(x.abs()));
-    println!("missing torque up to {missing:.2} N m");
     let rough = arm.clone().with_friction(&[1.0; 7], &[0.0; 7]).unwrap();
     let mut state = ArmState::at_rest(q);
     for _ in 0..4800 {
@@ -52,14 +51,13 @@ fn a_moving_arm_comes_to_rest_and_stays() {
     let arm = rough();
     let mut state = ArmState { q: arm.home(), qd: Joints::from_fn(7, |i| [0.3, -0.2, 0.4, 0.1, -0.5, 0.3, 0.6][i]) };
     let mut at_rest = None;
-    for k in 0..4800 {
+    for _ in 0..4800 {
         let drive = Drive { torque: arm.gravity_torque(&state.q), external: arm.zeros() };
         let report = arm.step(&mut state, &drive, &mut [], DT, 1).unwrap();
         assert!(report.converged);
         if let Some(q) = at_rest {
             assert_eq!(state, ArmState::at_rest(q), "at rest once, at rest for ever: no chatter");
         } else if state.qd.max_abs() == 0.0 {
-            println!("at rest after {:.2} s", (k + 1) as f64 * DT);
             at_rest = Some(state.q);
         }
     }
@@ -159,7 +157,6 @@ fn a_stiff_coupling_is_stable_and_correct() {
             held = DVec3::new(couplings[0].force, couplings[1].force, couplings[2].force).length();
             assert!(state.qd.max_abs() < 20.0, "{stiffness} N/m at step {k}: {:?}", state.qd);
         }
-        println!("{stiffness:.0e} N/m: worst {:.3} mm, force {held:.2} N", worst * 1e3);
         assert!(worst < 4.0 * 30.0 / stiffness + 1e-4 && held > 1.0 && held < 60.0, "{worst} {held}");
     }
 }
@@ -206,12 +203,6 @@ fn a_contact_only_pushes_and_its_friction_holds_below_the_limit() {
             anchor.y = now.y - (now.y - anchor.y).clamp(-reach, reach);
         }
         let slid = (arm.frames(&state.q).flange().translation - start).x;
-        println!(
-            "drawn with {pull} N: slid {:.3} mm in the last second, press {:.2} N, friction {:.2} N",
-            slid * 1e3,
-            last[0],
-            last[1]
-        );
         if holds {
             assert!(slid.abs() < 2e-5 && (last[1] + pull).abs() < 0.2 && (last[0] - 10.0).abs() < 0.2);
         } else {
@@ -381,6 +372,5 @@ fn random_couplings_are_solved_and_add_no_energy() {
             }
         }
     }
-    println!("{unsolved} of {STEPS} not solved to rounding");
     assert!(unsolved < STEPS / 50, "{unsolved}");
 }

@@ -54,7 +54,6 @@ fn the_default_reaches_the_papers_figures() {
         deviations.sort_by(f64::total_cmp);
         let (rms, p95) = (1e3 * (squares / 1920.0).sqrt(), 1e3 * deviations[deviations.len() * 95 / 100]);
         let droop = 1e3 * lag(&m);
-        println!("side {side}: tracking {rms:.4} mm, p95 RCM {p95:.4} mm, droop {droop:.4} mm");
         assert!(rms <= 0.048 && p95 <= 0.34 && droop <= 0.26, "{rms} {p95} {droop}");
     }
 }
@@ -98,7 +97,6 @@ fn friction_causes_no_limit_cycle() {
                 far = far.max(m.measured_cp().translation.distance(at));
                 fast = fast.max(m.measured_js().velocity.max_abs());
             });
-            println!("{} at rest for 10 s: moved by {:.2e} m, joints at most {fast:.1e} rad/s", law.name(), far);
             assert!(far < 3e-6 && fast < 1e-3, "{law:?}: {far} {fast}");
         }
     }
@@ -371,7 +369,6 @@ fn the_mount_reads_weight_load_and_inertia() {
         inertial = inertial.max((now.force - at_rest.force).length());
         before = after;
     });
-    println!("mount: inertia up to {inertial:.3} N, the arm's equations off by {worst:.1e} N m");
     assert!(inertial > 0.01 && worst < 0.02, "{inertial} {worst}");
 }
 

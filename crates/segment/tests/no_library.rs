@@ -23,7 +23,6 @@ fn a_missing_or_wrong_library_is_an_error_of_one_line() {
     for runtime in runtimes {
         let message = Sam2::open(&networks, runtime.as_deref()).unwrap_err().to_string();
         assert!(message.contains("pip install onnxruntime") && !message.contains('\n'), "{message}");
-        println!("{message}");
     }
     assert!(wanted_files(Some(&networks)).iter().any(|w| w.found.is_none()));
 

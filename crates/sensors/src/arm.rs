@@ -78,9 +78,6 @@ fn fr3() -> Vec<TriMesh> {
 
 /// Shapes of an arm's base and links, each in its own frame: one per entry of `poses` (base, links,
 /// flange) except the flange. The mesh of an invisible link is empty.
-///
-/// # Errors
-/// The description cannot be read or describes another arm, or a mesh is missing.
 pub(crate) fn links(scene: &Scene, arm: &Arm, model: &str, poses: &[Pose]) -> Result<Vec<TriMesh>> {
     let Some(said) = arm.drawn() else { return Ok(simple(model, poses)) };
     let file = scene.resolve(said);

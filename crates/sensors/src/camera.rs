@@ -152,7 +152,6 @@ impl RigCamera {
         }
     }
 
-    /// The rays for a picture of that size.
     pub fn rays(&mut self, size: [usize; 2]) -> &RayGenerator {
         let at = match self.rays.iter().position(|(s, _)| *s == size) {
             Some(at) => at,

@@ -36,7 +36,6 @@ pub(crate) struct CellStage {
     imaging: Imaging,
 }
 
-/// An organ on the stage.
 #[derive(Clone)]
 struct OrganOnStage {
     recorded: Arc<OrganSkin>,
@@ -52,7 +51,6 @@ struct OrganOnStage {
     skin: Vec<DVec3>,
 }
 
-/// An arm on the stage.
 #[derive(Clone)]
 struct Arm {
     name: &'static str,

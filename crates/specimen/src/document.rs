@@ -99,7 +99,6 @@ impl Document {
         Ok(())
     }
 
-    /// The specimen with its loaded organs.
     pub fn into_specimen(self, organs: Vec<Organ>) -> Specimen {
         let [w, x, y, z] = self.placement.rotation_wxyz;
         Specimen {
@@ -118,7 +117,6 @@ impl Document {
 }
 
 impl OrganEntry {
-    /// The organ with its meshes.
     pub fn organ(&self, body: TetMesh, surface: TriMesh) -> Organ {
         Organ {
             name: self.name.clone(),

@@ -77,6 +77,13 @@ pub enum Pins {
     },
 }
 
+impl Default for Pins {
+    /// The paper's share of pinned nodes (section IV-B, about 42%).
+    fn default() -> Self {
+        Self::Band { share: 0.42 }
+    }
+}
+
 /// Measurements of an organ at its reconstruction; kept in `specimen.toml` for people and reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

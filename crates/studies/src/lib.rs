@@ -6,7 +6,6 @@
 
 mod bench;
 pub mod docs;
-mod error;
 mod experiment;
 pub mod names;
 pub mod registry;
@@ -17,9 +16,9 @@ pub mod study;
 mod trials;
 
 pub use bench::{CellBench, EpisodeBench, GraspBench, MeshingBench, OrgansBench, RenderBench, ScalingBench};
-pub use error::{Error, Result};
 pub use experiment::{
     ControllerGridExperiment, ConvergenceExperiment, ElementQualityExperiment, GraspDesignsExperiment,
     IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment, ReconstructionExperiment, RolloutsExperiment,
     SettlingExperiment, SimilarityExperiment, WrenchExperiment,
 };
+pub use trocar_workflow::{Error, Result};

@@ -10,25 +10,16 @@ use trocar_specimen::Specimen;
 use trocar_workflow::phantoms;
 
 /// Parses a length in millimetres; returns metres.
-///
-/// # Errors
-/// A text that is not a number.
 pub(crate) fn millimetres(text: &str) -> std::result::Result<f64, std::num::ParseFloatError> {
     text.parse::<f64>().map(|mm| 1e-3 * mm)
 }
 
 /// Parses a pressure in kilopascals; returns pascals.
-///
-/// # Errors
-/// A text that is not a number.
 pub(crate) fn kilopascals(text: &str) -> std::result::Result<f64, std::num::ParseFloatError> {
     text.parse::<f64>().map(|kpa| 1e3 * kpa)
 }
 
 /// Parses an angle in degrees; returns radians.
-///
-/// # Errors
-/// A text that is not a number.
 pub(crate) fn degrees(text: &str) -> std::result::Result<f64, std::num::ParseFloatError> {
     text.parse::<f64>().map(f64::to_radians)
 }
@@ -68,27 +59,38 @@ pub struct SceneChoice {
     pub phantoms: PathBuf,
 }
 
-/// A solver.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum SolverName {
-    /// Vertex Block Descent as in the paper: 8 substeps of 10 sweeps, from the inertial predictor.
-    Paper,
-    /// The warped, prefactored quasi-Newton method.
-    Fast,
-    /// Vertex Block Descent from the adaptive start.
-    Adaptive,
+/// Values of an option, each for a variant of a type of another crate.
+macro_rules! choice {
+    ($(#[$about:meta])* $name:ident: $target:ty { $($(#[$help:meta])* $value:ident => $variant:ident,)* }) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+        pub enum $name {
+            $($(#[$help])* $value,)*
+        }
+
+        impl From<$name> for $target {
+            fn from(name: $name) -> Self {
+                match name {
+                    $($name::$value => Self::$variant,)*
+                }
+            }
+        }
+    };
+}
+
+choice! {
+    /// A solver.
+    SolverName: ScheduleName {
+        /// Vertex Block Descent as in the paper: 8 substeps of 10 sweeps, from the inertial predictor.
+        Paper => Paper,
+        /// The warped, prefactored quasi-Newton method.
+        Fast => Fast,
+        /// Vertex Block Descent from the adaptive start.
+        Adaptive => Adaptive,
+    }
 }
 
 impl SolverName {
-    /// The schedule of a scene.
-    pub fn schedule(self) -> ScheduleName {
-        match self {
-            Self::Paper => ScheduleName::Paper,
-            Self::Fast => ScheduleName::Fast,
-            Self::Adaptive => ScheduleName::Adaptive,
-        }
-    }
-
     /// The name in reports and JSON.
     pub fn name(self) -> &'static str {
         match self {
@@ -99,18 +101,19 @@ impl SolverName {
     }
 }
 
-/// A grasp design.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum DesignName {
-    /// Friction of two closing blades.
-    Friction,
-    /// Nodes tied to the jaws at their places in the undeformed organ, as in the paper: the tissue
-    /// snaps.
-    RestPose,
-    /// Nodes tied to the jaws where they are when the jaws close, as in the paper.
-    LivePose,
-    /// Like live-pose, through springs that slip and tear.
-    Compliant,
+choice! {
+    /// A grasp design.
+    DesignName: GraspDesignName {
+        /// Friction of two closing blades.
+        Friction => Friction,
+        /// Nodes tied to the jaws at their places in the undeformed organ, as in the paper: the tissue
+        /// snaps.
+        RestPose => RestPose,
+        /// Nodes tied to the jaws where they are when the jaws close, as in the paper.
+        LivePose => LivePose,
+        /// Like live-pose, through springs that slip and tear.
+        Compliant => Compliant,
+    }
 }
 
 /// The name of a design in reports and JSON.
@@ -123,89 +126,45 @@ pub(crate) fn design_name(design: GraspDesignName) -> &'static str {
     }
 }
 
-impl From<DesignName> for GraspDesignName {
-    fn from(name: DesignName) -> Self {
-        match name {
-            DesignName::Friction => Self::Friction,
-            DesignName::RestPose => Self::RestPose,
-            DesignName::LivePose => Self::LivePose,
-            DesignName::Compliant => Self::Compliant,
-        }
+choice! {
+    /// A model of the unseen back.
+    BackName: trocar_reconstruct::BackRule {
+        /// As thick as the silhouette is wide, as in the paper. Flat organs become too thick.
+        Rounded => Rounded,
+        /// As thick behind the rim as the front is above it.
+        Fitted => Fitted,
     }
 }
 
-/// A model of the unseen back.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum BackName {
-    /// As thick as the silhouette is wide, as in the paper. Flat organs become too thick.
-    Rounded,
-    /// As thick behind the rim as the front is above it.
-    Fitted,
-}
-
-impl From<BackName> for trocar_reconstruct::BackRule {
-    fn from(name: BackName) -> Self {
-        match name {
-            BackName::Rounded => Self::Rounded,
-            BackName::Fitted => Self::Fitted,
-        }
+choice! {
+    /// A mesher.
+    MesherName: trocar_reconstruct::MesherRule {
+        /// Isosurface stuffing: no slivers, fine at the surface, coarse inside.
+        Lattice => Lattice,
+        /// The program TetGen with the settings of the paper (Debian: apt install tetgen).
+        Tetgen => Tetgen,
     }
 }
 
-/// A mesher.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum MesherName {
-    /// Isosurface stuffing: no slivers, fine at the surface, coarse inside.
-    Lattice,
-    /// The program TetGen with the settings of the paper (Debian: apt install tetgen).
-    Tetgen,
-}
-
-impl From<MesherName> for trocar_reconstruct::MesherRule {
-    fn from(name: MesherName) -> Self {
-        match name {
-            MesherName::Lattice => Self::Lattice,
-            MesherName::Tetgen => Self::Tetgen,
-        }
+choice! {
+    /// Unit of length of a surface file.
+    Units: trocar_geometry::io::Unit {
+        /// Millimetres.
+        Mm => Millimetre,
+        /// Centimetres.
+        Cm => Centimetre,
+        /// Metres.
+        M => Metre,
     }
 }
 
-/// Unit of length of a surface file.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum Units {
-    /// Millimetres.
-    Mm,
-    /// Centimetres.
-    Cm,
-    /// Metres.
-    M,
-}
-
-impl From<Units> for trocar_geometry::io::Unit {
-    fn from(units: Units) -> Self {
-        match units {
-            Units::Mm => Self::Millimetre,
-            Units::Cm => Self::Centimetre,
-            Units::M => Self::Metre,
-        }
-    }
-}
-
-/// A kind of depth noise.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum SensorName {
-    /// Independent between pixels and frames.
-    Plain,
-    /// Like stereo matching: smooth over several pixels, slow in time, with widened silhouettes.
-    Stereo,
-}
-
-impl From<SensorName> for trocar_phantom::Sensor {
-    fn from(name: SensorName) -> Self {
-        match name {
-            SensorName::Plain => Self::Plain,
-            SensorName::Stereo => Self::Stereo,
-        }
+choice! {
+    /// A kind of depth noise.
+    SensorName: trocar_phantom::Sensor {
+        /// Independent between pixels and frames.
+        Plain => Plain,
+        /// Like stereo matching: smooth over several pixels, slow in time, with widened silhouettes.
+        Stereo => Stereo,
     }
 }
 
@@ -223,9 +182,6 @@ pub struct AppendixChoice {
 
 impl AppendixChoice {
     /// The specimen and its folder. A phantom is recorded and reconstructed in the folder `output`.
-    ///
-    /// # Errors
-    /// A specimen that cannot be read, or a phantom that cannot be made.
     pub(crate) fn read(&self, output: &Path, progress: &dyn Progress) -> Result<(Specimen, PathBuf)> {
         if let Some(folder) = &self.specimen {
             return Ok((Specimen::read(folder)?, folder.clone()));

@@ -55,42 +55,23 @@ pub trait Study: Args {
     fn run(&self, job: &Job<'_>) -> Result<(Self::Figures, Document)>;
 }
 
-/// Stops an interrupted study.
-///
-/// # Errors
-/// [`Error::Interrupted`] if the user asked to stop.
-pub(crate) fn check_interrupted(progress: &dyn Progress) -> Result<()> {
-    if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
-}
-
-/// One run of a study: output folder, progress, clock.
+/// One run of a study: output folder, progress.
 pub struct Job<'a> {
     output: PathBuf,
     study: &'static str,
     /// Progress, and the request to stop.
     pub progress: &'a dyn Progress,
-    clock: Instant,
 }
 
 impl<'a> Job<'a> {
     /// A run of study `S` with output folder `output`.
     pub fn new<S: Study>(output: &Path, progress: &'a dyn Progress) -> Self {
-        Self { output: output.to_owned(), study: S::NAME, progress, clock: Instant::now() }
+        Self { output: output.to_owned(), study: S::NAME, progress }
     }
 
     /// The output folder.
     pub fn output(&self) -> &Path {
         &self.output
-    }
-
-    /// The path of the report, as it is in the JSON.
-    pub fn report(&self) -> String {
-        self.output.join(REPORT).display().to_string()
-    }
-
-    /// Wall time since the start (s).
-    pub fn seconds(&self) -> f64 {
-        self.clock.elapsed().as_secs_f64()
     }
 
     /// The JSON file of the study. A folder that holds it is the output of an earlier run.
@@ -123,9 +104,6 @@ impl<'a> Job<'a> {
     /// Runs the trials that no earlier run in the output folder has finished, on `threads` threads
     /// (0: all). `key` names a trial uniquely; `settings` is everything else that its row depends
     /// on. The folder must exist. See [`crate::trials`].
-    ///
-    /// # Errors
-    /// The first error of a trial, an interruption, an unwritable file, two trials with one name.
     pub(crate) fn trials<T: Sync, R: Serialize + DeserializeOwned + Send>(
         &self,
         stage: &str,
@@ -139,20 +117,38 @@ impl<'a> Job<'a> {
     }
 }
 
+/// The outcome of a study, as it is in the JSON.
+#[derive(Debug, Serialize)]
+pub struct Outcome<F> {
+    /// The figures.
+    #[serde(flatten)]
+    pub figures: F,
+    /// Wall time (s), of a study with a page.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seconds: Option<f64>,
+    /// Path of the page.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub report: Option<String>,
+}
+
 /// Runs `study` and writes its page and its figures as JSON into the folder `output`.
 ///
 /// # Errors
 /// Those of the study; an unwritable file.
-pub fn run<S: Study>(study: &S, output: &Path, progress: &dyn Progress) -> Result<(S::Figures, Document)> {
-    let job = Job::new::<S>(output, progress);
+pub fn run<S: Study>(study: &S, output: &Path, progress: &dyn Progress) -> Result<(Outcome<S::Figures>, Document)> {
+    let (job, clock) = (Job::new::<S>(output, progress), Instant::now());
     let (figures, document) = study.run(&job)?;
+    let mut outcome = Outcome { figures, seconds: None, report: None };
     if S::FOLDER.is_some() && !S::WRITES_OWN_FILES {
+        let page = output.join(REPORT);
+        outcome.seconds = Some(clock.elapsed().as_secs_f64());
+        outcome.report = Some(page.display().to_string());
         job.claim()?;
-        write(&output.join(REPORT), document.page().as_bytes())?;
-        let json = serde_json::to_vec_pretty(&figures).map_err(|e| Error::Format(e.to_string()))?;
+        write(&page, document.page().as_bytes())?;
+        let json = serde_json::to_vec_pretty(&outcome).map_err(|e| Error::Format(e.to_string()))?;
         write(&job.marker(), &json)?;
     }
-    Ok((figures, document))
+    Ok((outcome, document))
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
@@ -223,8 +219,8 @@ impl<S: Study> Entry for Of<S> {
     fn run(&self, matches: &ArgMatches, progress: &dyn Progress) -> Result<Printed> {
         let study = S::from_arg_matches(matches).map_err(|e| Error::Mismatch(e.to_string()))?;
         let output = S::FOLDER.and_then(|_| matches.get_one::<PathBuf>("output"));
-        let (figures, document) = run(&study, output.map_or(Path::new(""), PathBuf::as_path), progress)?;
-        let json = serde_json::to_string(&figures).map_err(|e| Error::Format(e.to_string()))?;
+        let (outcome, document) = run(&study, output.map_or(Path::new(""), PathBuf::as_path), progress)?;
+        let json = serde_json::to_string(&outcome).map_err(|e| Error::Format(e.to_string()))?;
         let mut text = document.text();
         if let Some(output) = output {
             text += &format!("report {}\n", output.join(REPORT).display());

@@ -73,9 +73,6 @@ pub(crate) struct Trials {
 impl Trials {
     /// Opens the file of `study` in `folder`, which must exist. `settings` is everything that a row
     /// depends on besides its key; the program is added.
-    ///
-    /// # Errors
-    /// A file that cannot be read or written, or that another run uses.
     pub fn open(folder: &Path, experiment: &str, settings: &str) -> Result<Self> {
         let settings = format!("{:016x}", xxh3_64(format!("{settings}\n{}", program()).as_bytes()));
         let header = Header { experiment: experiment.to_owned(), settings };
@@ -116,9 +113,6 @@ impl Trials {
     ///
     /// A row that cannot be read back, such as one with an infinity, is not stored; every run
     /// computes it again.
-    ///
-    /// # Errors
-    /// The first error of a trial, an interruption, an unwritable file, two items with one key.
     pub fn run<T: Sync, R: Serialize + DeserializeOwned + Send>(
         &self,
         stage: &str,
@@ -135,19 +129,20 @@ impl Trials {
             return Err(Error::Mismatch(format!("two trials are named '{}'; names must be unique", pair[0])));
         }
         let earlier = |key: &String| self.done.get(key).and_then(|row| R::deserialize(row).ok());
-        let mut rows: Vec<Option<R>> = keys.iter().map(earlier).collect();
+        let rows: Vec<Option<R>> = keys.iter().map(earlier).collect();
         let missing: Vec<usize> = (0..items.len()).filter(|k| rows[*k].is_none()).collect();
         let finished = items.len() - missing.len();
-        let made = side_by_side(stage, &missing, (finished, threads), progress, |k, progress| {
-            let row = run(&items[*k], progress)?;
-            self.store(&keys[*k], &row)?;
-            Ok(row)
+        let rows: Vec<Mutex<Option<R>>> = rows.into_iter().map(Mutex::new).collect();
+        side_by_side(stage, missing.len(), (finished, threads), progress, &|k, progress| {
+            let k = missing[k];
+            let row = run(&items[k], progress)?;
+            self.store(&keys[k], &row)?;
+            *rows[k].lock().unwrap_or_else(PoisonError::into_inner) = Some(row);
+            Ok(())
         })?;
-        for (k, row) in missing.into_iter().zip(made) {
-            rows[k] = Some(row);
-        }
+        let rows = rows.into_iter().filter_map(|row| row.into_inner().unwrap_or_else(PoisonError::into_inner));
         let resumed = Resumed { trials: finished, put_aside: self.put_aside.clone() };
-        Ok(Outcomes { rows: rows.into_iter().flatten().collect(), resumed })
+        Ok(Outcomes { rows: rows.collect(), resumed })
     }
 
     fn store<R: Serialize + DeserializeOwned>(&self, trial: &str, row: &R) -> Result<()> {

@@ -21,7 +21,7 @@ fn the_papers_finding_depends_on_settings() {
         threads: 1,
     };
     let output = folder.path().join("out");
-    let result = run(&experiment, &output, &Silent).unwrap().0;
+    let result = run(&experiment, &output, &Silent).unwrap().0.figures;
     let row = |name: &str| result.integrators.iter().find(|r| r.name == name).unwrap();
     assert!(!row("Semi-implicit Euler").bounded);
     assert_eq!(row("XPBD as in Newton 1.8").ended_at_s, Some(1.0 / 60.0));

@@ -13,7 +13,7 @@ fn rays_agree_with_embree() {
     let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/tools/bin/python");
     let (scene, phantoms) = ("none".to_owned(), std::path::PathBuf::new());
     let bench = RenderBench { triangles: 20_000, samples: 0, rays: 200, python, picture: None, scene, phantoms };
-    let result = run(&bench, Path::new(""), &Silent).unwrap().0;
+    let result = run(&bench, Path::new(""), &Silent).unwrap().0.figures;
     assert!((result.triangles as f64 / 20_000.0 - 1.0).abs() < 0.1, "{} triangles", result.triangles);
     assert!(result.preview_224_ms > 0.0 && result.refit_ms > 0.0 && result.path_720p_ms.is_none());
     assert_eq!(result.rays.len(), 2);

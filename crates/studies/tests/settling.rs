@@ -15,7 +15,7 @@ fn phantom_b_settles() {
         schedule: SolverName::Adaptive,
         threads: 0,
     };
-    let result = run(&experiment, folder.path(), &Silent).unwrap().0;
+    let result = run(&experiment, folder.path(), &Silent).unwrap().0.figures;
     let b = &result.phantoms[0];
     assert!(b.settled && b.speed_m_s < 0.01 && b.paper_speed_m_s == Some(0.136), "{} m/s", b.speed_m_s);
     assert_eq!((b.organs.len(), b.speeds.len()), (5, 90));

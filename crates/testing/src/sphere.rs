@@ -3,9 +3,8 @@
 
 use glam::DVec3;
 use std::path::Path;
-use trocar_camera::{Camera, ColorImage, DepthImage, Distortion, Mask};
-use trocar_recording::{InstrumentRule, OrganInfo, RecordingInfo, RecordingWriter};
-use trocar_specimen::{Material, Pins};
+use trocar_camera::{Camera, ColorImage, DepthImage, Mask};
+use trocar_recording::{OrganInfo, RecordingInfo, RecordingWriter};
 
 /// Depth of the bed (m).
 pub const BED: f64 = 0.30;
@@ -21,32 +20,9 @@ pub fn info() -> RecordingInfo {
         rate_hz: Some(30.0),
         depth_scale_m: Some(0.001),
         up: [0.0, 0.0, -1.0],
-        depth_offset_px: [0.0; 2],
-        depth_max_m: None,
-        instruments: InstrumentRule::Masks,
-        note: String::new(),
-        source: None,
-        depth_camera: None,
-        depth_to_color: None,
-        followed: Vec::new(),
-        camera: Some(Camera {
-            width: 160,
-            height: 120,
-            fx: 200.0,
-            fy: 200.0,
-            cx: 79.5,
-            cy: 59.5,
-            distortion: Distortion::default(),
-        }),
-        organs: vec![OrganInfo {
-            name: "ball".into(),
-            polygon: vec![],
-            points: vec![],
-            points_outside: vec![],
-            base_px: None,
-            material: Material::default(),
-            pins: Pins::Band { share: 0.42 },
-        }],
+        camera: Some(Camera { fx: 200.0, fy: 200.0, ..Camera::centred(160, 120, 1.0) }),
+        organs: vec![OrganInfo { name: "ball".into(), ..OrganInfo::default() }],
+        ..RecordingInfo::default()
     }
 }
 

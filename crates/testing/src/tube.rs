@@ -3,8 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::missing_panics_doc, reason = "helpers of tests may panic")]
 
 use glam::DVec3;
+use std::path::{Path, PathBuf};
 use trocar_geometry::{LatticeMesher, SignedDistance, TetQuality};
-use trocar_scene::{Scene, SpecimenSource, Variation};
+use trocar_scene::{Scene, SpecimenSource, TaskName, Variation};
 use trocar_specimen::{End, Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 
 /// A tube along x, 60 mm long and 9 mm thick: about the appendix.
@@ -81,4 +82,21 @@ pub fn resection() -> Scene {
     scene.task.episode_s = 20.0;
     scene.variation = Variation::starts();
     scene
+}
+
+/// Writes coarse tubes into `folder`, and the scene file `name` of them, in which arms reach for
+/// `seconds` before these cameras.
+pub fn reach(folder: &Path, name: &str, seconds: f64, cameras: &[&str]) -> PathBuf {
+    let specimen = folder.join("tube");
+    if !specimen.exists() {
+        two_tubes(ONE_END, 4e-3).write(&specimen).unwrap();
+    }
+    let mut scene = resection();
+    scene.specimen = SpecimenSource::folder("tube");
+    scene.task.name = TaskName::PortReach;
+    scene.task.episode_s = seconds;
+    scene.cameras.retain(|c| cameras.contains(&c.name.as_str()));
+    let file = folder.join(name);
+    std::fs::write(&file, scene.to_toml().unwrap()).unwrap();
+    file
 }

@@ -5,7 +5,7 @@ use crate::phantoms::scene_specimen;
 use crate::reconstruct::{REPORT, refuse_overlap};
 use crate::recorder::Recorder;
 use crate::specimen_cache::{SpecimenCache, drawn_specimens};
-use crate::{Error, Result};
+use crate::{Error, Result, check_interrupted};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -111,9 +111,7 @@ impl EpisodeRun {
         let page = pages::episode(&recording, &pictures, real_time_factor)?;
         let path = staged.path().join(REPORT);
         std::fs::write(&path, page).map_err(|source| Error::Io { path, source })?;
-        if progress.interrupted() {
-            return Err(Error::Interrupted);
-        }
+        check_interrupted(progress)?;
         staged.commit()?;
         let (folder, report) = (output.display().to_string(), output.join(REPORT).display().to_string());
         Ok(EpisodeOutput { result: recording.result(), wall_s, real_time_factor, folder, report })
@@ -195,9 +193,7 @@ pub fn sweep_files(files: &[PathBuf], ranges: &[String], progress: &dyn Progress
     progress.begin("channels", files.len() as u64);
     let mut episodes = Vec::with_capacity(files.len());
     for file in &files {
-        if progress.interrupted() {
-            return Err(Error::Interrupted);
-        }
+        check_interrupted(progress)?;
         episodes.push(read_channels(file)?);
         progress.advance(1);
     }

@@ -1,6 +1,7 @@
 //! Errors of the commands.
 
 use std::path::PathBuf;
+use trocar_core::Progress;
 
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -33,6 +34,9 @@ pub enum Error {
     /// An image or camera is unusable.
     #[error(transparent)]
     Camera(#[from] trocar_camera::Error),
+    /// Two pictures cannot be compared.
+    #[error(transparent)]
+    Similarity(#[from] trocar_camera::metrics::Error),
     /// The output would replace or change the input.
     #[error("the output folder {output} overlaps the input {input}; choose another output folder", output = output.display(), input = input.display())]
     Overlap {
@@ -57,6 +61,9 @@ pub enum Error {
         /// Number of episodes of the whole campaign.
         planned: usize,
     },
+    /// A step of a study failed.
+    #[error(transparent)]
+    Study(Box<dyn std::error::Error + Send + Sync>),
     /// A result cannot be serialised.
     #[error("the result cannot be written: {0}")]
     Format(String),
@@ -107,6 +114,14 @@ pub enum Error {
     /// A cell cannot be built or stepped.
     #[error(transparent)]
     Cell(trocar_cell::Error),
+}
+
+/// Stops interrupted work.
+///
+/// # Errors
+/// [`Error::Interrupted`] if the user asked to stop.
+pub fn check_interrupted(progress: &dyn Progress) -> Result<()> {
+    if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
 }
 
 /// Keeps interruptions apart from other errors.

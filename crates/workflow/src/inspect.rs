@@ -5,7 +5,6 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use trocar_camera::Camera;
 use trocar_recording::{OrganInfo, Recording, RecordingInfo};
-use trocar_specimen::{Material, Pins};
 
 /// The contents of a recording.
 #[derive(Clone, Debug, Serialize)]
@@ -104,11 +103,7 @@ fn write_template(recording: &Recording, written: &mut Vec<PathBuf>) -> Result<(
         polygon: [(0.4, 0.4), (0.6, 0.4), (0.6, 0.6), (0.4, 0.6)]
             .map(|(x, y)| [(x * w).round(), (y * h).round()])
             .into(),
-        points: Vec::new(),
-        points_outside: Vec::new(),
-        base_px: None,
-        material: Material::default(),
-        pins: Pins::Band { share: 0.42 },
+        ..OrganInfo::default()
     };
     let described = |info: &RecordingInfo| toml::to_string(info).map_err(|e| Error::Format(e.to_string()));
     let text = described(&recording.info)?;

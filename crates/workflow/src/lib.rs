@@ -25,7 +25,7 @@ pub mod video;
 pub use counted::counted;
 pub use demo::{Demo, DemoResult};
 pub use episode_run::{EpisodeOutput, EpisodeRun, read_episode, read_varied, replay, sweep_files};
-pub use error::{Error, Result};
+pub use error::{Error, Result, check_interrupted};
 pub use inspect::{Inspection, inspect};
 pub use lift::Lift;
 pub use lift_result::LiftResult;

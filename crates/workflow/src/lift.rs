@@ -6,7 +6,7 @@ use crate::phantoms::scene_specimen;
 use crate::reconstruct::{REPORT, refuse_overlap};
 use crate::recorder::Recorder;
 use crate::specimen_scene::{free_scene, grasp_lift, task_organ};
-use crate::{Error, Result, pages};
+use crate::{Error, Result, check_interrupted, pages};
 use std::path::Path;
 use std::time::Instant;
 use trocar_core::Progress;
@@ -232,8 +232,6 @@ fn write(
     }
     write("channels.csv", &table.into_inner().map_err(|e| Error::Format(e.to_string()))?)?;
     write(REPORT, pages::lift(specimen, lifted, before)?.as_bytes())?;
-    if progress.interrupted() {
-        return Err(Error::Interrupted);
-    }
+    check_interrupted(progress)?;
     Ok(staged.commit()?)
 }

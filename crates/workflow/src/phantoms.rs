@@ -73,7 +73,6 @@ pub fn scene_specimen(scene: &Scene, phantoms: &Path, progress: &dyn Progress) -
     source_specimen(&scene.specimen, &scene.folder, phantoms, progress)
 }
 
-/// The folder in which a phantom is kept.
 fn kept_in(phantoms: &Path, name: &str, seed: u32) -> PathBuf {
     phantoms.join(format!("{name}-{seed}"))
 }

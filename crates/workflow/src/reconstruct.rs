@@ -1,7 +1,7 @@
 //! The commands' work from folder to folder: read, run, write the result and its report.
 
 use crate::truth::{Truth, TruthFigures};
-use crate::{Error, Result, pages};
+use crate::{Error, Result, check_interrupted, pages};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
@@ -72,15 +72,15 @@ impl CompositeFigures {
     /// # Errors
     /// Names the file of the truth that is unreadable or of another size.
     pub fn of(r: &Reconstruction, recording: &Path) -> Result<Self> {
-        let truth = Truth::read(r, &recording.join("truth"))?;
+        let (truth, c) = (Truth::read(r, &recording.join("truth"))?, &r.composite);
         Ok(Self {
-            frames_used: r.frames_used,
-            recovered_share: r.recovered_share,
-            coverage: r.coverage,
-            depth_range_median_mm: r.depth_range_median * 1e3,
-            frames_s: r.times.frames,
-            decoding_cpu_s: r.times.decoding,
-            medians_s: r.times.medians,
+            frames_used: c.frames_used,
+            recovered_share: c.recovered_share,
+            coverage: c.coverage,
+            depth_range_median_mm: c.depth_range_median * 1e3,
+            frames_s: c.times.frames,
+            decoding_cpu_s: c.times.decoding,
+            medians_s: c.times.medians,
             truth: truth.and_then(|truth| truth.figures(r)),
         })
     }
@@ -141,17 +141,12 @@ pub fn reconstruct_surface(
 }
 
 fn finish(staged: StagedFolder, specimen: &Specimen, html: &str, progress: &dyn Progress) -> Result<()> {
-    stop_if_asked(progress)?;
+    // Making a report does not check for interruption.
+    check_interrupted(progress)?;
     specimen.write_into(staged.path())?;
     let path = staged.path().join(REPORT);
     std::fs::write(&path, html).map_err(|source| Error::Io { path, source })?;
     Ok(staged.commit()?)
-}
-
-/// Making a report does not check for interruption, so a request to stop is honoured before
-/// anything is put in place.
-fn stop_if_asked(progress: &dyn Progress) -> Result<()> {
-    if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
 }
 
 /// Refuses an output that is, contains or is inside the input, which would be replaced or changed.

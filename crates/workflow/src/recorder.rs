@@ -21,7 +21,6 @@ const MAX_STILLS: usize = 7;
 const FRAME_INTERVAL: f64 = 0.1;
 const MAX_FRAMES: usize = 150;
 
-/// Pictures of an episode.
 #[derive(Clone, Debug, Default)]
 pub struct Pictures {
     /// Captions and pictures.
@@ -52,15 +51,12 @@ impl Recorder {
     pub fn new(rig: CameraRig) -> Self {
         let name = |wanted: &str| rig.cameras().iter().find(|c| **c == wanted).map(|c| (*c).to_owned());
         let camera = name("endoscope").or_else(|| rig.cameras().first().map(|c| (*c).to_owned()));
-        let depth = name("d405");
-        let (stills, frames) = (Vec::new(), Vec::new());
-        let camera = camera.unwrap_or_default();
         Self {
+            camera: camera.unwrap_or_default(),
+            depth: name("d405"),
             rig,
-            camera,
-            depth,
-            stills,
-            frames,
+            stills: Vec::new(),
+            frames: Vec::new(),
             records_video: true,
             lifted: false,
             spent: Duration::ZERO,
@@ -68,7 +64,6 @@ impl Recorder {
         }
     }
 
-    /// Records only stills.
     #[must_use]
     pub fn stills_only(self) -> Self {
         Self { records_video: false, depth: None, ..self }
@@ -125,9 +120,6 @@ impl Recorder {
     }
 
     /// Returns all pictures, with one of the end.
-    ///
-    /// # Errors
-    /// The first error of any picture.
     pub fn finish(mut self, cell: &Cell) -> Result<Pictures> {
         if let Some(error) = self.failed {
             return Err(error);

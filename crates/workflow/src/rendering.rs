@@ -12,7 +12,7 @@ use crate::episode_replay::EpisodeReplay;
 use crate::phantoms::scene_specimen;
 use crate::picture_colors::{averaged, label_color, shown};
 use crate::video::VideoWriter;
-use crate::{Error, Result};
+use crate::{Error, Result, check_interrupted};
 use glam::DVec3;
 use playback::Playback;
 use rendered::visible_objects;
@@ -223,9 +223,7 @@ impl Rendering {
         let color = averaged(&fine.color, finer);
         let picture = rig.render_still(&camera, size, &RenderSettings::Preview { shadows: false })?.clone();
         let render_s = clock.elapsed().as_secs_f64();
-        if progress.interrupted() {
-            return Err(Error::Interrupted);
-        }
+        check_interrupted(progress)?;
         self.write(&rig, &camera, &color, &picture, output, (0.0, render_s))
     }
 
@@ -261,9 +259,7 @@ impl Rendering {
             let color = averaged(&fine.color, finer);
             Ok((color, rig.render(play.cell(), camera, size, &RenderSettings::Preview { shadows: false })?.clone()))
         })?;
-        if progress.interrupted() {
-            return Err(Error::Interrupted);
-        }
+        check_interrupted(progress)?;
         let render_s = clock.elapsed().as_secs_f64();
         let made = self.write(&rig, camera, &color, &picture, output, (play.cell().time(), render_s))?;
         Ok(Rendered { differs: play.difference(), ..made })
@@ -287,9 +283,7 @@ impl Rendering {
         let mut picture = Picture::new(size[0], size[1]);
         playback::stage(progress, "video", play.periods().unwrap_or(1) as u64, || {
             loop {
-                if progress.interrupted() {
-                    return Err(Error::Interrupted);
-                }
+                check_interrupted(progress)?;
                 if play.cell().time() >= f64::from(frames) / f64::from(hz) - 1e-9 {
                     let clock = std::time::Instant::now();
                     let finer = self.supersampling(size);
@@ -307,23 +301,8 @@ impl Rendering {
         })?;
         video.finish(output)?;
         let files = vec![output.display().to_string()];
-        let (time_s, samples) = (play.cell().time(), self.samples.unwrap_or(0));
-        let seen = visible_objects(&rig, &picture.labels);
-        let (triangles, frames) = (rig.triangles(), frames as usize);
-        let [width, height] = size;
-        Ok(Rendered {
-            camera: camera.to_owned(),
-            width,
-            height,
-            time_s,
-            frames,
-            samples,
-            triangles,
-            render_s,
-            seen,
-            files,
-            differs: play.difference(),
-        })
+        let made = self.rendered(&rig, (camera, size), &picture.labels, files, (play.cell().time(), render_s));
+        Ok(Rendered { frames: frames as usize, differs: play.difference(), ..made })
     }
 
     fn write(
@@ -333,7 +312,7 @@ impl Rendering {
         color: &ColorImage,
         picture: &Picture,
         output: &Path,
-        (time_s, render_s): (f64, f64),
+        times: (f64, f64),
     ) -> Result<Rendered> {
         let stem = output.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let beside = |what: &str| output.with_file_name(format!("{stem}-{what}.png"));
@@ -350,19 +329,32 @@ impl Rendering {
             let image = ColorImage { pixels, ..picture.color };
             image.write_png(&files[files.len() - 1])?;
         }
-        Ok(Rendered {
+        let files = files.iter().map(|f| f.display().to_string()).collect();
+        Ok(self.rendered(rig, (camera, [color.width, color.height]), &picture.labels, files, times))
+    }
+
+    /// The figures of one picture.
+    fn rendered(
+        &self,
+        rig: &CameraRig,
+        (camera, [width, height]): (&str, [usize; 2]),
+        labels: &[u16],
+        files: Vec<String>,
+        (time_s, render_s): (f64, f64),
+    ) -> Rendered {
+        Rendered {
             camera: camera.to_owned(),
-            width: color.width,
-            height: color.height,
+            width,
+            height,
             time_s,
             frames: 1,
             samples: self.samples.unwrap_or(0),
             triangles: rig.triangles(),
             render_s,
-            seen: visible_objects(rig, &picture.labels),
-            files: files.iter().map(|f| f.display().to_string()).collect(),
+            seen: visible_objects(rig, labels),
+            files,
             differs: None,
-        })
+        }
     }
 }
 

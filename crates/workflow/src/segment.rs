@@ -1,6 +1,6 @@
 //! Makes the masks of a recording in the folder structure that the reconstruction reads.
 
-use crate::{Error, Result, counted};
+use crate::{Error, Result, check_interrupted, counted};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -157,9 +157,7 @@ fn by_metal(recording: &Recording, folder: &Path, progress: &dyn Progress) -> Re
         .packets(&all)
         .par_bridge()
         .map(|packet| {
-            if progress.interrupted() {
-                return Err(Error::Interrupted);
-            }
+            check_interrupted(progress)?;
             // A broken frame has no mask; the composite leaves it out too.
             let Ok(frame) = packet.parts.and_then(|parts| recording.decode(packet.frame, &parts)) else {
                 return Ok(0.0);
@@ -179,9 +177,7 @@ fn by_metal(recording: &Recording, folder: &Path, progress: &dyn Progress) -> Re
 fn followed(recording: &Recording, sam: &Sam2, folder: &Path, progress: &dyn Progress) -> Result<Vec<f64>> {
     let mut masks: Vec<Option<Mask>> = vec![None; recording.len()];
     let frame_of = |index: usize| -> Result<Option<RgbdFrame>> {
-        if progress.interrupted() {
-            return Err(Error::Interrupted);
-        }
+        check_interrupted(progress)?;
         Ok(recording.frame(index).ok())
     };
     for instrument in &recording.info.followed {

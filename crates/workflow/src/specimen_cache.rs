@@ -1,11 +1,11 @@
 //! The specimens of a scene's episodes: read from their folders, or made of phantoms and kept.
 
 use crate::phantoms::{is_made, source_specimen};
-use crate::{Error, Result};
+use crate::{Result, check_interrupted};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
-use trocar_core::{Progress, Silent};
+use trocar_core::{Progress, Quiet, Silent};
 use trocar_scene::{Scene, SpecimenSource};
 use trocar_specimen::Specimen;
 use trocar_task::SpecimenSupply;
@@ -66,9 +66,7 @@ impl SpecimenCache {
         };
         progress.begin(&stage, sources.len() as u64);
         for source in sources {
-            if progress.interrupted() {
-                return Err(Error::Interrupted);
-            }
+            check_interrupted(progress)?;
             self.read(source, &Quiet(progress))?;
             progress.advance(1);
         }
@@ -112,19 +110,4 @@ pub fn drawn_specimens(scene: &Scene, seeds: impl Iterator<Item = u64>) -> Vec<S
         }
     }
     drawn
-}
-
-/// Asks for interruption and shows nothing.
-struct Quiet<'a>(&'a dyn Progress);
-
-impl Progress for Quiet<'_> {
-    fn begin(&self, _: &str, _: u64) {}
-
-    fn advance(&self, _: u64) {}
-
-    fn end(&self) {}
-
-    fn interrupted(&self) -> bool {
-        self.0.interrupted()
-    }
 }

@@ -53,7 +53,7 @@ impl Truth {
     pub fn read(r: &Reconstruction, dir: &Path) -> Result<Option<Self>> {
         let find = |name: &str| [dir.join(name), dir.join("truth").join(name)].into_iter().find(|p| p.is_file());
         let fits = |path: &Path, width: usize, height: usize| {
-            let size = (r.background.width, r.background.height);
+            let size = (r.composite.color.width, r.composite.color.height);
             if (width, height) == size {
                 return Ok(());
             }
@@ -76,7 +76,7 @@ impl Truth {
 
     /// The whole image, the part under the instruments, and the rest.
     pub fn parts(&self, r: &Reconstruction) -> [Part; 3] {
-        let under = |i: usize| r.instruments.set[i];
+        let under = |i: usize| r.composite.instruments.set[i];
         [
             self.part("whole image", r, &|_| true),
             self.part("under the instruments", r, &under),
@@ -98,19 +98,20 @@ impl Truth {
     }
 
     fn part(&self, name: &'static str, r: &Reconstruction, inside: &dyn Fn(usize) -> bool) -> Part {
-        let filled: Vec<usize> = (0..r.depth.depth.len()).filter(|&i| r.depth.depth[i] > 0.0 && inside(i)).collect();
+        let filled: Vec<usize> =
+            (0..r.composite.depth.depth.len()).filter(|&i| r.composite.depth.depth[i] > 0.0 && inside(i)).collect();
         let depth = self.depth.as_ref().and_then(|truth| {
             let signed: Vec<f64> = filled
                 .iter()
                 .filter(|&&i| truth.depth[i] > 0.0)
-                .map(|&i| 1e3 * (f64::from(r.depth.depth[i]) - f64::from(truth.depth[i])))
+                .map(|&i| 1e3 * (f64::from(r.composite.depth.depth[i]) - f64::from(truth.depth[i])))
                 .collect();
             let size: Vec<f64> = signed.iter().map(|e| e.abs()).collect();
             Some((size.len(), quantile(&size, 0.5)?, quantile(&size, 0.95)?, quantile(&signed, 0.5)?))
         });
         let color = self.color.as_ref().and_then(|truth| {
             let difference = |&i: &usize| {
-                let (a, b) = (r.background.pixels[i], truth.pixels[i]);
+                let (a, b) = (r.composite.color.pixels[i], truth.pixels[i]);
                 (0..3).map(|c| f64::from(a[c].abs_diff(b[c]))).sum::<f64>() / 3.0
             };
             let all: Vec<f64> = filled.iter().map(difference).collect();

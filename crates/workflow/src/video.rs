@@ -23,9 +23,6 @@ pub(crate) enum VideoWriter {
 
 impl VideoWriter {
     /// Begins the video `output` in the format `extension`.
-    ///
-    /// # Errors
-    /// An MP4 without ffmpeg, a folder that does not exist.
     pub fn begin(output: &Path, extension: &str) -> Result<Self> {
         let folder = output.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
         if !folder.is_dir() {
@@ -47,9 +44,6 @@ impl VideoWriter {
     }
 
     /// Adds a frame that begins at `time_ms` in a video of `hz` frames per second.
-    ///
-    /// # Errors
-    /// Too many frames for memory, an encoder that stopped.
     pub fn add(&mut self, frame: ColorImage, time_ms: f64, hz: u32) -> Result<()> {
         match self {
             Self::Webp(frames) => {
@@ -77,9 +71,6 @@ impl VideoWriter {
     }
 
     /// Writes the file `output`.
-    ///
-    /// # Errors
-    /// A video that cannot be encoded or written.
     pub fn finish(mut self, output: &Path) -> Result<()> {
         match &mut self {
             Self::Webp(frames) => {
@@ -105,7 +96,6 @@ impl VideoWriter {
     }
 }
 
-/// Path of the partial file.
 fn partial_path(output: &Path) -> PathBuf {
     let name = output.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     output.with_file_name(format!(".{}-{name}", std::process::id()))

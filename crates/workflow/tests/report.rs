@@ -8,7 +8,7 @@ use std::path::Path;
 use trocar_camera::{Camera, ColorImage, DepthImage, Distortion, Mask};
 use trocar_core::Pose;
 use trocar_geometry::{RepairReport, TetMesh, TetQuality, TriMesh};
-use trocar_reconstruct::{CompositeTimes, OrganView, Reconstruction};
+use trocar_reconstruct::{Composite, CompositeTimes, OrganView, Reconstruction};
 use trocar_render::phong::{Instance, PhongScene, Shading};
 use trocar_specimen::{Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 use trocar_workflow::pages as report;
@@ -153,11 +153,7 @@ fn reconstruction() -> Reconstruction {
     let view = |i: usize, name: &str| OrganView {
         name: name.to_owned(),
         mask: mask(i as u16 + 1),
-        depth_error: frame
-            .depth
-            .depth
-            .iter()
-            .zip(&depth.depth)
+        depth_error: (frame.depth.depth.iter().zip(&depth.depth))
             .map(|(a, b)| if *a > 0.0 { a - b } else { 0.0 })
             .collect(),
         compared: mask(i as u16 + 1),
@@ -174,16 +170,21 @@ fn reconstruction() -> Reconstruction {
     }
     Reconstruction {
         specimen,
-        input,
-        instruments,
-        background: frame.color,
-        depth,
-        frames_used: 91,
-        recovered_share: 0.034,
-        coverage: 0.903,
-        depth_range_median: 0.0019,
+        composite: Composite {
+            input,
+            instruments,
+            color: frame.color,
+            colored: mask(0),
+            depth,
+            frames_used: 91,
+            recovered_share: 0.034,
+            coverage: 0.903,
+            depth_range_median: 0.0019,
+            moving: mask(0),
+            hash: 0,
+            times: CompositeTimes::default(),
+        },
         warnings: Vec::new(),
-        times: CompositeTimes::default(),
         organs,
         notes: vec![format!("frame 12 of {HOSTILE} dropped")],
     }
@@ -227,8 +228,8 @@ fn a_reconstruction_is_shown_whole() {
     let dir = tempfile::tempdir().unwrap();
     let truth = dir.path().join("truth");
     std::fs::create_dir(&truth).unwrap();
-    r.background.write_png(&truth.join("color.png")).unwrap();
-    r.depth.write_png(&truth.join("depth.png"), 1e-4).unwrap();
+    r.composite.color.write_png(&truth.join("color.png")).unwrap();
+    r.composite.depth.write_png(&truth.join("depth.png"), 1e-4).unwrap();
 
     let html = report::reconstruction(&r, Some(dir.path())).unwrap();
     keep("reconstruction.html", &html);
@@ -262,7 +263,7 @@ fn images_that_do_not_fit_are_an_error() {
     let mut r = reconstruction();
     r.organs[1].depth_error.pop();
     assert!(report::reconstruction(&r, None).unwrap_err().to_string().contains("stomach"));
-    r.background = ColorImage::new(3, 3, [0; 3]);
+    r.composite.color = ColorImage::new(3, 3, [0; 3]);
     assert!(report::reconstruction_sections(&r).is_err());
 }
 

@@ -44,9 +44,6 @@ impl Action {
     }
 
     /// The command in the five numbers from `first` on.
-    ///
-    /// # Errors
-    /// Names the number that is not finite or out of range.
     pub(super) fn wanted(&self, model: &ArmModel, state: &ArmState, first: usize) -> Result<Wanted> {
         let n = &self.numbers[first..first + NUMBERS];
         self.check(model, n).map_err(|(k, reason)| {

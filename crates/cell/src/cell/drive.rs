@@ -164,7 +164,6 @@ impl Drive {
         }
     }
 
-    /// The state.
     pub fn state(&self) -> DriveState {
         match self {
             Self::Dynamic(arm) => DriveState::Dynamic(Box::new(arm.state())),
@@ -172,7 +171,6 @@ impl Drive {
         }
     }
 
-    /// Restores a state.
     pub fn restore(&mut self, state: &DriveState) -> Result<()> {
         match (self, state) {
             (Self::Dynamic(arm), DriveState::Dynamic(state)) => Ok(arm.restore(state)?),

@@ -78,7 +78,6 @@ impl Exchange {
         Wrench { force: force.clamp_length_max(MAX_LOAD), torque: self.load.torque }
     }
 
-    /// The numbers of the state.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
         let Self { load, at, stiffness, limited } = *self;
         let vectors = [load.force, load.torque, at].map(|v| v.to_array());

@@ -4,7 +4,6 @@ use clap::Args;
 use std::path::PathBuf;
 use trocar_scene::VariationSet;
 
-/// Arguments of `episode`.
 #[derive(Debug, Args)]
 pub struct Episode {
     /// Scene file, or a built-in scene such as cell-a.
@@ -32,7 +31,6 @@ pub struct Episode {
     pub output: PathBuf,
 }
 
-/// Arguments of `replay`.
 #[derive(Debug, Args)]
 pub struct Replay {
     /// Episode folder, or its episode.trocar.
@@ -52,7 +50,6 @@ pub struct Replay {
     pub phantoms: PathBuf,
 }
 
-/// Arguments of `sweep`.
 #[derive(Debug, Args)]
 pub struct Sweep {
     /// Episode folders, or their channels.parquet files.

@@ -4,7 +4,6 @@ use clap::Args;
 use std::path::PathBuf;
 use trocar_scene::{Split, VariationSet};
 
-/// Arguments of `evaluate`.
 #[derive(Debug, Args)]
 pub struct Evaluate {
     /// Scene file, or a built-in scene such as cell-a.

@@ -3,7 +3,6 @@
 use clap::Args;
 use std::path::PathBuf;
 
-/// Arguments of `render`.
 #[derive(Debug, Args)]
 pub struct Render {
     /// Specimen folder; scene file or built-in scene such as cell-a, whose videos show a scripted

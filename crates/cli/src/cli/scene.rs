@@ -2,7 +2,6 @@
 
 use clap::{Args, Subcommand};
 
-/// Arguments of `scene`.
 #[derive(Debug, Args)]
 pub struct Scene {
     /// The action.
@@ -10,7 +9,6 @@ pub struct Scene {
     pub action: SceneAction,
 }
 
-/// Actions on scenes.
 #[derive(Debug, Subcommand)]
 pub enum SceneAction {
     /// List the built-in scenes.

@@ -3,7 +3,6 @@
 use clap::Args;
 use std::path::PathBuf;
 
-/// Arguments of `specimens`.
 #[derive(Debug, Args)]
 pub struct Specimens {
     /// The phantom: phantom-a, phantom-b or phantom-c.

@@ -4,7 +4,6 @@ use clap::{ArgMatches, Args, Command, Error, FromArgMatches, Subcommand, error::
 use trocar_studies::registry::STUDIES;
 use trocar_studies::study::Kind;
 
-/// Arguments of `experiment`.
 #[derive(Debug, Args)]
 pub struct Experiment {
     /// The study.
@@ -12,7 +11,6 @@ pub struct Experiment {
     pub study: ExperimentChoice,
 }
 
-/// Arguments of `bench`.
 #[derive(Debug, Args)]
 pub struct Bench {
     /// The study.
@@ -20,7 +18,6 @@ pub struct Bench {
     pub study: BenchChoice,
 }
 
-/// The chosen study.
 #[derive(Debug)]
 pub struct StudyChoice {
     /// Its name.
@@ -29,11 +26,9 @@ pub struct StudyChoice {
     pub options: ArgMatches,
 }
 
-/// An experiment.
 #[derive(Debug)]
 pub struct ExperimentChoice(pub StudyChoice);
 
-/// A benchmark.
 #[derive(Debug)]
 pub struct BenchChoice(pub StudyChoice);
 

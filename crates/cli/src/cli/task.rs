@@ -2,7 +2,6 @@
 
 use clap::{Args, Subcommand};
 
-/// Arguments of `task`.
 #[derive(Debug, Args)]
 pub struct Tasks {
     /// The action.
@@ -10,7 +9,6 @@ pub struct Tasks {
     pub action: TaskAction,
 }
 
-/// Actions on tasks.
 #[derive(Debug, Subcommand)]
 pub enum TaskAction {
     /// List the built-in tasks.

@@ -6,6 +6,7 @@ use crate::output;
 use serde::Serialize;
 use trocar_campaign::run_episode;
 use trocar_core::Progress;
+use trocar_report::document::Table;
 use trocar_task::ArmSummary;
 use trocar_workflow::{
     EpisodeHeader, EpisodeOutput, EpisodeRun, Error, Result, counted, read_episode, replay, sweep_files,
@@ -65,15 +66,13 @@ pub fn replay_file(arguments: &cli::Replay, json: bool, progress: &dyn Progress)
 pub fn sweep(arguments: &cli::Sweep, json: bool, progress: &dyn Progress) -> Result<()> {
     let sweep = sweep_files(&arguments.channels, &arguments.gates, progress)?;
     output::print(json, &sweep, |s| {
-        let mut header: Vec<&str> = s.gates.iter().map(String::as_str).collect();
-        header.extend(s.stages.iter().map(String::as_str));
         let row = |r: &trocar_workflow::SweepRow| {
             let values = r.values.iter().map(|v| format!("{v:.4}"));
             values.chain(r.by_stage.iter().map(ToString::to_string)).collect::<Vec<_>>()
         };
-        let rows: Vec<Vec<String>> = s.rows.iter().map(row).collect();
+        let table = Table::new(s.gates.iter().chain(&s.stages).cloned(), s.rows.iter().map(row).collect());
         let episodes = counted(s.episodes, "episode");
-        format!("{episodes}; passed stages:\n{}", output::table(&header, &rows))
+        format!("{episodes}; passed stages:\n{}", table.text().trim_end())
     });
     Ok(())
 }
@@ -120,7 +119,6 @@ fn text(made: &EpisodeOutput) -> String {
     )
 }
 
-/// One line on an arm.
 fn arm(a: &ArmSummary) -> String {
     let lag = a.lag_ms.map_or("lag not measured".to_owned(), |lag| format!("lag {lag:.0} ms"));
     format!(

@@ -3,8 +3,9 @@
 use crate::cli;
 use crate::commands::scene::note_reach;
 use crate::output;
-use trocar_campaign::{Campaign, CampaignResult, PolicySpec, Share, repeats};
+use trocar_campaign::{Bin, Campaign, CampaignResult, PolicySpec, Share, repeats};
 use trocar_core::Progress;
+use trocar_report::document::Table;
 use trocar_workflow::{Result, counted};
 
 pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Result<()> {
@@ -35,62 +36,39 @@ fn curves(r: &CampaignResult) -> String {
     let mut lines = String::new();
     for curve in &r.by {
         let Some(first) = curve.bins.first() else { continue };
-        let header: Vec<&str> =
-            std::iter::once(curve.label.as_str()).chain(first.policies.iter().map(|s| s.policy.as_str())).collect();
+        let header = std::iter::once(curve.label.as_str()).chain(first.policies.iter().map(|s| s.policy.as_str()));
         let said = |s: &Share| {
             format!("{}/{} ({:.0}-{:.0}%)", s.passed, s.episodes, 1e2 * s.interval.low, 1e2 * s.interval.high)
         };
-        let rows: Vec<Vec<String>> = curve
-            .bins
-            .iter()
-            .map(|bin| std::iter::once(bin.value.clone()).chain(bin.policies.iter().map(said)).collect())
-            .collect();
-        lines += &format!("{}\n", output::table(&header, &rows));
+        let row = |bin: &Bin| std::iter::once(bin.value.clone()).chain(bin.policies.iter().map(said)).collect();
+        lines += &Table::new(header, curve.bins.iter().map(row).collect()).text();
     }
     lines
 }
 
 fn text(r: &CampaignResult, curves: &str) -> String {
     let or_dash = |v: Option<f64>, decimals: usize| v.map_or("-".to_owned(), |v| format!("{v:.decimals$}"));
-    let rows: Vec<Vec<String>> = r
-        .policies
-        .iter()
-        .map(|p| {
-            let stages = p.stages.iter().map(|s| s.passed.to_string()).collect::<Vec<_>>().join(" ");
-            vec![
-                p.policy.clone(),
-                format!("{}/{}", p.passed, p.episodes),
-                format!("{:.0}-{:.0}%", 1e2 * p.interval.low, 1e2 * p.interval.high),
-                stages,
-                format!("{:.2}", p.mean_score),
-                if p.attached > 0 { format!("{}/{}", p.held_to_end, p.attached) } else { "-".to_owned() },
-                or_dash(p.lift_median_mm, 1),
-                or_dash(p.rcm_median_mm, 3),
-                or_dash(p.rcm_max_mm, 3),
-                p.ends.diverged.to_string(),
-                p.ends.policy_error.to_string(),
-                p.suspensions(),
-            ]
-        })
-        .collect();
+    let table = Table::of(
+        &r.policies,
+        &[
+            ("policy", &|p| p.policy.clone()),
+            ("passed", &|p| format!("{}/{}", p.passed, p.episodes)),
+            ("95%", &|p| format!("{:.0}-{:.0}%", 1e2 * p.interval.low, 1e2 * p.interval.high)),
+            ("by stage", &|p| p.stages.iter().map(|s| s.passed.to_string()).collect::<Vec<_>>().join(" ")),
+            ("score", &|p| format!("{:.2}", p.mean_score)),
+            ("held", &|p| if p.attached > 0 { format!("{}/{}", p.held_to_end, p.attached) } else { "-".to_owned() }),
+            ("lift (mm)", &|p| or_dash(p.lift_median_mm, 1)),
+            ("RCM (mm)", &|p| or_dash(p.rcm_median_mm, 3)),
+            ("max (mm)", &|p| or_dash(p.rcm_max_mm, 3)),
+            ("diverged", &|p| p.ends.diverged.to_string()),
+            ("failed", &|p| p.ends.policy_error.to_string()),
+            ("suspended", &|p| p.suspensions()),
+        ],
+    );
     let stages = r
         .policies
         .first()
         .map_or_else(String::new, |p| p.stages.iter().map(|s| s.stage.as_str()).collect::<Vec<_>>().join(", "));
-    let header = [
-        "policy",
-        "passed",
-        "95%",
-        "by stage",
-        "score",
-        "held",
-        "lift (mm)",
-        "RCM (mm)",
-        "max (mm)",
-        "diverged",
-        "failed",
-        "suspended",
-    ];
     let failed: String = r
         .policies
         .iter()
@@ -111,7 +89,7 @@ fn text(r: &CampaignResult, curves: &str) -> String {
         r.seed,
         r.variation.name,
         r.distinct_outcomes,
-        output::table(&header, &rows),
+        table.text().trim_end(),
         r.hash,
         r.report
     )

@@ -5,6 +5,7 @@ use crate::output;
 use trocar_core::Progress;
 use trocar_geometry::io::Unit;
 use trocar_reconstruct::{Settings, SurfaceRule};
+use trocar_report::document::Table;
 use trocar_workflow::{Reconstructed, Result, counted, reconstruct_recording, reconstruct_surface};
 
 pub fn run(arguments: &Reconstruct, json: bool, progress: &dyn Progress) -> Result<()> {
@@ -33,42 +34,25 @@ pub fn run(arguments: &Reconstruct, json: bool, progress: &dyn Progress) -> Resu
     Ok(())
 }
 
-/// The specimen as text.
 pub fn text(r: &Reconstructed) -> String {
     let number = |x: Option<f64>| x.map_or("-".to_owned(), |x| format!("{x:.2}"));
-    let rows: Vec<Vec<String>> = r
-        .organs
-        .iter()
-        .map(|o| {
-            vec![
-                o.organ.clone(),
-                o.facts.nodes.to_string(),
-                o.facts.tets.to_string(),
-                format!("{:.1}", o.facts.min_dihedral_deg),
-                format!("{:.2}", o.facts.median_edge_mm),
-                format!("{:.2}", o.facts.volume_cm3),
-                if o.facts.watertight { "yes" } else { "NO" }.to_owned(),
-                o.facts.inverted.to_string(),
-                number(o.facts.depth_error_median_mm),
-                number(o.facts.depth_error_signed_mm),
-                number(o.facts.covered),
-            ]
-        })
-        .collect();
-    let header = [
-        "organ",
-        "nodes",
-        "tets",
-        "min dihedral (deg)",
-        "edge (mm)",
-        "volume (cm3)",
-        "closed",
-        "inverted",
-        "|error| (mm)",
-        "error (mm)",
-        "covered",
-    ];
-    let mut out = output::table(&header, &rows);
+    let table = Table::of(
+        &r.organs,
+        &[
+            ("organ", &|o| o.organ.clone()),
+            ("nodes", &|o| o.facts.nodes.to_string()),
+            ("tets", &|o| o.facts.tets.to_string()),
+            ("min dihedral (deg)", &|o| format!("{:.1}", o.facts.min_dihedral_deg)),
+            ("edge (mm)", &|o| format!("{:.2}", o.facts.median_edge_mm)),
+            ("volume (cm3)", &|o| format!("{:.2}", o.facts.volume_cm3)),
+            ("closed", &|o| if o.facts.watertight { "yes" } else { "NO" }.to_owned()),
+            ("inverted", &|o| o.facts.inverted.to_string()),
+            ("|error| (mm)", &|o| number(o.facts.depth_error_median_mm)),
+            ("error (mm)", &|o| number(o.facts.depth_error_signed_mm)),
+            ("covered", &|o| number(o.facts.covered)),
+        ],
+    );
+    let mut out = table.text().trim_end().to_owned();
     if let Some(c) = &r.composite {
         out += &format!(
             "\ncomposite of {}: {:.1}% of the image recovered from under instruments, depth on {:.1}%, median depth range {:.2} mm",

@@ -56,7 +56,6 @@ struct Checked {
     reach: Vec<ToolReach>,
 }
 
-/// A new scene.
 #[derive(Serialize)]
 struct NewScene {
     scene: Scene,
@@ -88,7 +87,6 @@ fn new(folder: &Path, organ: Option<&str>, output: Option<&Path>, json: bool) ->
     Ok(())
 }
 
-/// One line per tool.
 fn reach_lines(reach: &[ToolReach], organ: &str) -> Vec<String> {
     let line = |r: &ToolReach| {
         let (arm, kind) = (r.arm.name(), if r.kind == InstrumentKind::Grasper { "grasper" } else { "cutter" });

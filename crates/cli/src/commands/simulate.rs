@@ -37,7 +37,7 @@ pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<
         organ: arguments.organ.clone(),
         design: arguments.design.map(Into::into),
         jaw_force: arguments.jaw_force,
-        schedule: arguments.schedule.map(crate::cli::SolverName::schedule),
+        schedule: arguments.schedule.map(Into::into),
         threads: arguments.threads,
     };
     let result = match scene {
@@ -48,7 +48,6 @@ pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<
     Ok(())
 }
 
-/// A run as text.
 pub fn text(r: &LiftResult) -> String {
     let s = &r.episode.summary;
     let d = &s.details;
@@ -108,7 +107,6 @@ pub fn text(r: &LiftResult) -> String {
     )
 }
 
-/// A cut as text.
 fn cut(s: &Severed) -> String {
     let c = &s.cut;
     if c.pieces.is_empty() {

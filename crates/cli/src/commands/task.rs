@@ -4,6 +4,7 @@ use crate::cli::{TaskAction, Tasks as Arguments};
 use crate::output;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use trocar_report::document::Table;
 use trocar_scene::{BUILTIN_TASKS, Builtin, Definition, Scene, TaskName};
 use trocar_workflow::{Error, Result};
 
@@ -63,9 +64,8 @@ fn show(name: &str, json: bool) -> Result<()> {
 fn table(scene: &Scene, definition: &Definition) -> String {
     let mut lines =
         vec![format!("{} in scene '{}', for at most {} s", scene.task.name.name(), scene.name, scene.task.episode_s)];
-    let rows: Vec<Vec<String>> =
-        definition.stages.iter().map(|s| vec![s.name.clone(), s.share.to_string(), s.when.clone()]).collect();
-    lines.push(output::table(&["stage", "share", "passes when"], &rows));
+    let rows = definition.stages.iter().map(|s| vec![s.name.clone(), s.share.to_string(), s.when.clone()]).collect();
+    lines.push(Table::new(["stage", "share", "passes when"], rows).text().trim_end().to_owned());
     lines.extend(definition.aborts.iter().map(|a| format!("aborted: {} when {}", a.name, a.when)));
     lines.join("\n")
 }

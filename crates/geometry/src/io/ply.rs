@@ -8,7 +8,6 @@ use ply_rs_bw::ply::{ElementDef, Header, Property, PropertyAccess, PropertyAcces
 use std::io::Cursor;
 use std::path::Path;
 
-/// A vertex of the file.
 #[derive(Default)]
 struct Vertex {
     position: DVec3,

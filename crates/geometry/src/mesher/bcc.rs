@@ -125,13 +125,7 @@ pub(super) fn jumps(at: DVec3) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    struct Ball(f64);
-    impl SignedDistance for Ball {
-        fn distance(&self, p: DVec3) -> f64 {
-            p.length() - self.0
-        }
-    }
+    use crate::shapes::Ball;
 
     #[test]
     fn every_sign_is_right_and_slots_are_points() {
@@ -167,7 +161,6 @@ mod tests {
         let counting = Counting(0.into());
         let lattice = Lattice::sample(&counting, (DVec3::splat(-1.0), DVec3::splat(1.0)), 0.02).unwrap();
         let (evaluated, all) = (counting.0.into_inner(), lattice.blocks.count.iter().product::<usize>() * BLOCK_POINTS);
-        println!("evaluated {evaluated} of {all} lattice points");
         assert!(evaluated < all / 4);
     }
 }

@@ -109,6 +109,5 @@ fn every_lattice_tet_keeps_the_angle_bound() {
             random_least = random_least.min(angles(&sides, &moves, &|i, j| shares[4 * i + j]).0);
         }
     }
-    println!("{least:.4} to {most:.4} degrees; at random {random_least:.4}");
     assert!(least > 10.7 && most < 165.0 && random_least > least);
 }

@@ -273,7 +273,6 @@ fn too_many(lattice: &Lattice) -> Error {
 
 /// A face of a leaf. Lengths are in half cells.
 struct Face {
-    /// Centre of the leaf.
     centre: Point,
     /// Edge of the leaf in cells, that is, half the edge in half cells.
     size: i32,
@@ -310,22 +309,16 @@ mod tests {
     use super::*;
     use crate::SignedDistance;
     use crate::quality::dihedral_angles;
+    use crate::shapes::Ball;
     use glam::DVec3;
     use std::collections::BTreeMap;
-
-    struct Ball;
-    impl SignedDistance for Ball {
-        fn distance(&self, p: DVec3) -> f64 {
-            p.length() - 1.0
-        }
-    }
 
     /// Lattice tets have angles of 60 to 90 degrees. The graded tets (halves and quarters of
     /// lattice tets, half pyramids) have 45 to 120.
     #[test]
     fn the_inner_tets_are_of_four_kinds_with_good_angles() {
-        let mut lattice = Lattice::sample(&Ball, (DVec3::splat(-1.0), DVec3::splat(1.0)), 0.03).unwrap();
-        let mut cuts = Cuts::find(&lattice, &Ball).unwrap();
+        let mut lattice = Lattice::sample(&Ball(1.0), (DVec3::splat(-1.0), DVec3::splat(1.0)), 0.03).unwrap();
+        let mut cuts = Cuts::find(&lattice, &Ball(1.0)).unwrap();
         cuts.warp(&mut lattice);
         let filling = Filling::new(&lattice, &cuts, 64).unwrap();
         let slots = lattice.values.len();
@@ -350,8 +343,7 @@ mod tests {
                 }
             }
         }
-        println!("angles [0.1 degrees]: count, volume: {kinds:?}");
-        assert_eq!(kinds.len(), 4);
+        assert_eq!(kinds.len(), 4, "{kinds:?}");
         assert!(kinds.contains_key(&[600, 600, 600, 600, 900, 900]), "the lattice tet");
         assert!(kinds.keys().all(|angles| angles[0] >= 450 && angles[5] <= 1200));
         assert!(kinds.values().all(|&(count, volume)| count > 100 && volume > 0.0));

@@ -119,19 +119,12 @@ impl Bits {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SignedDistance;
+    use crate::shapes::Ball;
     use glam::DVec3;
-
-    struct Ball;
-    impl SignedDistance for Ball {
-        fn distance(&self, p: DVec3) -> f64 {
-            p.length() - 1.0
-        }
-    }
 
     #[test]
     fn leaves_are_balanced_and_the_surface_is_finest() {
-        let lattice = Lattice::sample(&Ball, (DVec3::splat(-1.0), DVec3::splat(1.0)), 0.03).unwrap();
+        let lattice = Lattice::sample(&Ball(1.0), (DVec3::splat(-1.0), DVec3::splat(1.0)), 0.03).unwrap();
         let tree = Octree::over(&lattice, 1 << 30);
         let n = lattice.blocks.count.map(|n| (n * BLOCK) as i32);
         let mut cells = [0usize; 8];
@@ -153,7 +146,6 @@ mod tests {
                 }
             }
         }
-        println!("cells by level: {cells:?}");
         assert!(cells[1] > 0 && cells[2] > 0 && cells[3] > 0);
         let limited = Octree::over(&lattice, 3);
         assert!(limited.whole.len() == 1 && Octree::over(&lattice, 1).whole.is_empty());

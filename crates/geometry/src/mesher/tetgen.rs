@@ -60,10 +60,6 @@ impl Default for TetgenMesher {
 impl Mesher for TetgenMesher {
     /// Runs the program in a temporary folder. Elements with negative volume are flipped. Of
     /// several parts the largest is kept.
-    ///
-    /// # Errors
-    /// A surface that is not closed or intersects itself; a program that is missing, fails, exceeds
-    /// the time limit or writes invalid files; elements that do not fill the surface.
     fn mesh(&self, surface: &TriMesh) -> Result<TetMesh> {
         check(surface)?;
         if !surface.is_watertight() {

@@ -60,7 +60,6 @@ impl Walked {
         self.data_at + self.data_len
     }
 
-    /// The description of a connection.
     fn connection(&self, source: &ByteSource) -> Parsed<Record<'static>> {
         if self.data_len > MAX_DESCRIPTION {
             return Err(format!(

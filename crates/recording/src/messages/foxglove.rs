@@ -76,17 +76,7 @@ fn timestamp(bytes: &[u8]) -> Parsed<u64> {
 
 /// `foxglove.RawImage`.
 pub(crate) fn raw_image(bytes: &[u8]) -> Parsed<Raw<'_>> {
-    let mut raw = Raw {
-        stamp: 0,
-        frame: String::new(),
-        width: 0,
-        height: 0,
-        encoding: String::new(),
-        big_endian: false,
-        step: 0,
-        data: Cow::Borrowed(&[]),
-        depth_unit: None,
-    };
+    let mut raw = Raw::default();
     fields(bytes, |number, value| {
         match (number, value) {
             (1, Value::Bytes(b)) => raw.stamp = timestamp(b)?,
@@ -105,7 +95,7 @@ pub(crate) fn raw_image(bytes: &[u8]) -> Parsed<Raw<'_>> {
 
 /// `foxglove.CompressedImage`.
 pub(crate) fn compressed_image(bytes: &[u8]) -> Parsed<Packed<'_>> {
-    let mut packed = Packed { stamp: 0, frame: String::new(), format: String::new(), data: Cow::Borrowed(&[]) };
+    let mut packed = Packed::default();
     fields(bytes, |number, value| {
         match (number, value) {
             (1, Value::Bytes(b)) => packed.stamp = timestamp(b)?,
@@ -172,19 +162,17 @@ pub(crate) fn frame_transforms(bytes: &[u8]) -> Parsed<Vec<Transform>> {
 /// `foxglove.FrameTransform`.
 pub(crate) fn frame_transform(bytes: &[u8]) -> Parsed<Transform> {
     let mut transform = Transform::default();
-    let mut rotation = [0.0; 4];
     fields(bytes, |number, value| {
         match (number, value) {
             (1, Value::Bytes(b)) => transform.stamp = timestamp(b)?,
             (2, Value::Bytes(b)) => transform.parent = text(b),
             (3, Value::Bytes(b)) => transform.child = text(b),
             (4, Value::Bytes(b)) => transform.translation = components(b)?,
-            (5, Value::Bytes(b)) => rotation = components(b)?,
+            (5, Value::Bytes(b)) => transform.rotation = components(b)?,
             _ => {}
         }
         Ok(())
     })?;
-    transform.rotation = rotation;
     Ok(transform)
 }
 
@@ -288,10 +276,9 @@ pub(crate) fn raw_image_json(bytes: &[u8]) -> Parsed<Raw<'static>> {
         width: image.width,
         height: image.height,
         encoding: image.encoding,
-        big_endian: false,
         step: image.step,
         data: Cow::Owned(data),
-        depth_unit: None,
+        ..Raw::default()
     })
 }
 

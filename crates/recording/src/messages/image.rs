@@ -65,6 +65,7 @@ impl RawDepth {
 }
 
 /// An uncompressed image before its pixels are decoded.
+#[derive(Default)]
 pub(crate) struct Raw<'a> {
     pub stamp: u64,
     pub frame: String,
@@ -80,6 +81,7 @@ pub(crate) struct Raw<'a> {
 }
 
 /// A compressed image before it is decompressed.
+#[derive(Default)]
 pub(crate) struct Packed<'a> {
     pub stamp: u64,
     pub frame: String,

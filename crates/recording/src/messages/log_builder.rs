@@ -18,7 +18,6 @@ const FREE_GROWTH: u64 = 64 << 20;
 /// as a whole.
 const MAX_GROWTH: u64 = 256;
 
-/// The place of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Place {
     time: u64,

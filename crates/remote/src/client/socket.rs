@@ -95,7 +95,6 @@ impl Socket {
         }
     }
 
-    /// Sends a binary message.
     pub fn send(&mut self, message: Vec<u8>, wait: Wait) -> Result<()> {
         self.control.until(wait.deadline);
         self.web.send(Message::Binary(message.into())).map_err(|e| failure(e, &self.url, self.limit, wait))

@@ -40,7 +40,6 @@ impl Memory {
         Self { torque, correction: Joints::zeros(torque.len()), paused: JointSet::default() }
     }
 
-    /// Every number of it.
     pub fn numbers(&self) -> impl Iterator<Item = f64> {
         let Self { torque, correction, paused } = self;
         let paused = (0..torque.len()).map(|i| f64::from(u8::from(paused.contains(i))));

@@ -89,7 +89,6 @@ pub(super) struct Reference {
 }
 
 impl Reference {
-    /// Every number of it.
     pub fn numbers(&self) -> Vec<f64> {
         let Self { goal, target, previous, points: [a, b, c], phase, value, q, qd, qdd, pace } = self;
         let goal = f64::from(u8::from(*goal == Goal::Joints));
@@ -153,7 +152,6 @@ impl Reference {
         self.target = *target;
     }
 
-    /// Advances by `dt` (s).
     pub fn advance(&mut self, context: &ReferenceContext<'_>, dt: f64) {
         let (before, rate) = (*self, self.qd);
         let mut pace = (before.pace + dt / RECOVERY).min(1.0);

@@ -4,23 +4,23 @@
 //! without contact between organs gets the same actions, alternating with the first. The difference
 //! is the cost of that contact.
 
-use super::machine::Machine;
+use super::machine::{Machine, Setup};
 use crate::Result;
 use crate::names::SceneChoice;
 use crate::statistics::median;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
 use trocar_cell::{Action, Cell, ContactParts, Setpoint};
 use trocar_report::document::{Document, Section, Table};
-use trocar_report::table::{count, fixed};
+use trocar_report::table::fixed;
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;
 use trocar_task::policy::{Script, Scripted};
 use trocar_task::{Episode, Policy, SETTLE_S};
-use trocar_workflow::scene_specimen;
 use trocar_workflow::specimen_scene::{grasp_lift, task_organ};
+use trocar_workflow::{check_interrupted, scene_specimen};
 
 /// Swing of the right arm: amplitude of the pivots (rad), frequency (Hz).
 const SWING: (f64, f64) = (0.1, 0.5);
@@ -64,16 +64,9 @@ pub struct CellBenchResult {
     pub periods: usize,
     /// Whether the grasper held the tissue at the end.
     pub attached: bool,
-    /// Number of organs.
-    pub organs: usize,
-    /// Number of nodes.
-    pub nodes: usize,
-    /// Number of elements.
-    pub tets: usize,
-    /// Worker threads.
-    pub threads: usize,
-    /// The machine.
-    pub machine: Machine,
+    /// What was stepped, and on what.
+    #[serde(flatten)]
+    pub setup: Setup,
 }
 
 impl Study for CellBench {
@@ -134,7 +127,6 @@ impl Study for CellBench {
         let (all, arms) = (ms(now.all, from.all), ms(now.arms, from.arms));
         let (tissue, without) = (ms(now.tissue, from.tissue), ms(apart_now.tissue, apart_from.tissue));
         let period_ms = 1e3 * cell.period();
-        let bodies = cell.world().model.bodies();
         let worst_ms = times.iter().copied().fold(0.0, f64::max);
         let result = CellBenchResult {
             real_time_factor: period_ms / all,
@@ -148,11 +140,7 @@ impl Study for CellBench {
             period_ms,
             periods: times.len(),
             attached: cell.observe().first().is_some_and(|a| a.attached),
-            organs: bodies.len(),
-            nodes: bodies.iter().map(|b| b.len()).sum(),
-            tets: bodies.iter().map(|b| b.tets().len()).sum(),
-            threads: if self.threads == 0 { machine.cores } else { self.threads },
-            machine,
+            setup: Setup::new(&cell.world().model, self.threads, machine),
         };
         let document = document(&result);
         Ok((result, document))
@@ -186,15 +174,11 @@ fn document(r: &CellBenchResult) -> Document {
         vec!["without contact between organs".to_owned(), fixed(r.real_time_factor_without_organ_contact, 2)],
     ];
     let line = format!(
-        "control period {} ms; {} periods, {} organs, {} nodes, {} tets; the lift {}; {} threads on {}",
+        "control period {} ms; {} periods; the lift {}; {}",
         fixed(r.period_ms, 1),
         r.periods,
-        r.organs,
-        count(r.nodes),
-        count(r.tets),
         if r.attached { "held" } else { "did NOT hold" },
-        r.threads,
-        r.machine.described()
+        r.setup.described()
     );
     Document::new("Cell", "Speed of the two-arm cell")
         .with(Section::new("Control periods", "").table(Table::new(head, rows)).lines([line]))

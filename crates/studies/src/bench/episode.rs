@@ -3,10 +3,10 @@
 //! The scripted controller performs the task of the scene. All runs use the same seed and do the
 //! same work.
 
-use super::machine::Machine;
+use super::machine::{Machine, Setup};
 use crate::names::SceneChoice;
 use crate::statistics::median;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
@@ -14,11 +14,11 @@ use std::time::{Duration, Instant};
 use trocar_core::Progress;
 use trocar_render::RenderSettings;
 use trocar_report::document::{Document, Section, Table};
-use trocar_report::table::{count, fixed};
+use trocar_report::table::fixed;
 use trocar_scene::Scene;
 use trocar_sensors::CameraRig;
 use trocar_task::{Episode, Policy, policy};
-use trocar_workflow::scene_specimen;
+use trocar_workflow::{check_interrupted, scene_specimen};
 
 /// Number of timed path-traced frames.
 const PATH_FRAMES: usize = 10;
@@ -99,16 +99,10 @@ pub struct EpisodeBenchResult {
     pub state_hash: String,
     /// Whether all runs end in the same state.
     pub repeatable: bool,
-    /// Number of organs.
-    pub organs: usize,
-    /// Number of nodes.
-    pub nodes: usize,
     /// Names of the cameras.
     pub cameras: Vec<String>,
     /// Side of the pictures (px).
     pub size: usize,
-    /// Worker threads for tissue.
-    pub threads: usize,
     /// The kind of pictures behind `real_time_factor`.
     pub pictures: String,
     /// Mean time of ten path-traced frames of 1280 x 720 through the first camera (ms); none with 0
@@ -119,8 +113,9 @@ pub struct EpisodeBenchResult {
     /// Real-time factor with such a picture from every camera per control period, extrapolated from
     /// these frames.
     pub real_time_factor_path_720p: Option<f64>,
-    /// The machine.
-    pub machine: Machine,
+    /// What was stepped, and on what.
+    #[serde(flatten)]
+    pub setup: Setup,
 }
 
 /// Wall times of one run (s).
@@ -168,7 +163,6 @@ impl Study for EpisodeBench {
         let period_ms = 1e3 * episode.cell().period();
         let run_factors: Vec<f64> = runs.iter().map(|t| episode.time() / t.all.max(1e-9)).collect();
         let real_time_factor = median(&mut run_factors.clone());
-        let bodies = episode.cell().world().model.bodies();
         let path_720p_ms = (self.samples > 0).then(|| self.path_traced(&episode, &mut rig, progress)).transpose()?;
         let pictures_ms = ms(|t| t.pictures);
         let traced_pictures_ms = ms(|t| t.traced);
@@ -197,12 +191,9 @@ impl Study for EpisodeBench {
             passed: episode.summary().passed,
             state_hash: format!("{:016x}", hashes[0]),
             repeatable: hashes.iter().all(|h| *h == hashes[0]),
-            organs: bodies.len(),
-            nodes: bodies.iter().map(|b| b.len()).sum(),
             cameras: self.cameras.clone(),
             size: self.size,
-            threads: if self.threads == 0 { machine.cores } else { self.threads },
-            machine,
+            setup: Setup::new(&episode.cell().world().model, self.threads, machine),
         };
         let document = document(&result);
         Ok((result, document))
@@ -303,15 +294,12 @@ fn document(r: &EpisodeBenchResult) -> Document {
     let mut lines = vec![
         format!("target {}; runs {factors}; control period {} ms", r.bar, fixed(r.period_ms, 1)),
         format!(
-            "{} s simulated, {}, {} periods, {} organs, {} nodes; {}; {} threads on {}",
+            "{} s simulated, {}, {} periods; {}; {}",
             fixed(r.simulated_s, 1),
             r.end,
             r.periods,
-            r.organs,
-            count(r.nodes),
             r.cameras.join(", "),
-            r.threads,
-            r.machine.described()
+            r.setup.described()
         ),
     ];
     lines.push(format!(

@@ -6,21 +6,21 @@
 //! the end of the frame. The tissue moves alike, so the difference is contact alone: detection,
 //! forces, and the iterations that its stiffness costs.
 
-use super::machine::Machine;
+use super::machine::{Machine, Setup};
 use crate::names::{AppendixChoice, DesignName, design_name};
 use crate::statistics::median;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
 use trocar_cell::{Cell, ContactParts, FRAME, Timing};
 use trocar_core::Progress;
 use trocar_report::document::{Document, Section, Table};
-use trocar_report::table::{count, fixed, percent};
+use trocar_report::table::{fixed, percent};
 use trocar_task::policy::Scripted;
 use trocar_task::{Episode, Policy, SETTLE_S};
-use trocar_workflow::Lift;
 use trocar_workflow::specimen_scene::{free_scene, task_organ};
+use trocar_workflow::{Lift, check_interrupted};
 
 /// The timed phases: those with the jaws near the tissue.
 const PHASES: [&str; 6] = ["enter", "close", "lift", "hold", "lower", "open"];
@@ -94,21 +94,13 @@ pub struct GraspBenchResult {
     pub design: &'static str,
     /// Whether the lift with contact held.
     pub held: bool,
-    /// Number of organs.
-    pub organs: usize,
-    /// Number of nodes.
-    pub nodes: usize,
-    /// Number of elements.
-    pub tets: usize,
     /// Repetitions.
     pub repeats: usize,
-    /// Worker threads.
-    pub threads: usize,
-    /// The machine.
-    pub machine: Machine,
+    /// What was stepped, and on what.
+    #[serde(flatten)]
+    pub setup: Setup,
 }
 
-/// One frame of each run.
 struct Frames {
     phase: &'static str,
     with: Frame,
@@ -118,12 +110,10 @@ struct Frames {
     without: Frame,
 }
 
-/// One frame of one run.
 #[derive(Clone, Copy)]
 struct Frame {
     /// Wall time of the tissue (s).
     seconds: f64,
-    /// Solver iterations.
     iterations: usize,
 }
 
@@ -170,8 +160,6 @@ impl Study for GraspBench {
             progress.end();
             held = with.summary().held;
         }
-        let bodies = with.cell().world().model.bodies();
-        let size = (bodies.iter().map(|b| b.len()).sum(), bodies.iter().map(|b| b.tets().len()).sum());
         let all = timing("all", &times);
         let result = GraspBenchResult {
             real_time_factor: 1e3 * FRAME / all.with_contact_ms,
@@ -181,12 +169,8 @@ impl Study for GraspBench {
             phases: std::iter::once(all).chain(PHASES.map(|phase| timing(phase, &times))).collect(),
             design: design_name(design),
             held,
-            organs: specimen.organs.len(),
-            nodes: size.0,
-            tets: size.1,
             repeats: self.repeats,
-            threads: if self.threads == 0 { machine.cores } else { self.threads },
-            machine,
+            setup: Setup::new(&with.cell().world().model, self.threads, machine),
         };
         let document = document(&result);
         Ok((result, document))
@@ -256,7 +240,6 @@ fn timing(phase: &'static str, frames: &[Frames]) -> GraspPhaseTiming {
     }
 }
 
-/// Frames of one run.
 struct Run(Vec<Frame>);
 
 impl Run {
@@ -274,51 +257,40 @@ impl Run {
 }
 
 fn document(r: &GraspBenchResult) -> Document {
-    let head = [
-        "Phase",
-        "Frames",
-        "Contact (ms)",
-        "Same motion (ms)",
-        "Distance (mm)",
-        "No contact (ms)",
-        "Iterations",
-        "Worst (ms)",
-        "Own share",
-        "Contact's share",
-    ];
-    let row = |p: &GraspPhaseTiming| {
-        let iterations = [p.with_contact_iterations, p.same_motion_iterations, p.without_contact_iterations];
-        vec![
-            p.phase.to_owned(),
-            p.frames.to_string(),
-            fixed(p.with_contact_ms, 2),
-            fixed(p.same_motion_ms, 2),
-            fixed(p.same_motion_off_mm, 4),
-            fixed(p.without_contact_ms, 2),
-            iterations.map(|n| fixed(n, 0)).join("/"),
-            fixed(p.worst_ms, 2),
-            percent(p.own_share, 1),
-            percent(p.contact_share, 1),
-        ]
+    let iterations = |p: &GraspPhaseTiming| {
+        [p.with_contact_iterations, p.same_motion_iterations, p.without_contact_iterations]
+            .map(|n| fixed(n, 0))
+            .join("/")
     };
+    let table = Table::of(
+        &r.phases,
+        &[
+            ("Phase", &|p| p.phase.to_owned()),
+            ("Frames", &|p| p.frames.to_string()),
+            ("Contact (ms)", &|p| fixed(p.with_contact_ms, 2)),
+            ("Same motion (ms)", &|p| fixed(p.same_motion_ms, 2)),
+            ("Distance (mm)", &|p| fixed(p.same_motion_off_mm, 4)),
+            ("No contact (ms)", &|p| fixed(p.without_contact_ms, 2)),
+            ("Iterations", &|p| iterations(p)),
+            ("Worst (ms)", &|p| fixed(p.worst_ms, 2)),
+            ("Own share", &|p| percent(p.own_share, 1)),
+            ("Contact's share", &|p| percent(p.contact_share, 1)),
+        ],
+    );
     let lines = [
         "Same motion: each frame again without contact but with its forces. No contact: without contact and its forces."
             .to_owned(),
         format!(
-            "{}x real time with contact, {}x without; {} grasp, {}; {} organs, {} nodes, {} tets; {} threads on {}",
+            "{}x real time with contact, {}x without; {} grasp, {}; {}",
             fixed(r.real_time_factor, 2),
             fixed(r.real_time_factor_without_contact, 2),
             r.design,
             if r.held { "held" } else { "NOT held" },
-            r.organs,
-            count(r.nodes),
-            count(r.tets),
-            r.threads,
-            r.machine.described()
+            r.setup.described()
         ),
     ];
     Document::new("Grasp", "Cost of contact with the gripper")
-        .with(Section::new("Phases", "").table(Table::new(head, r.phases.iter().map(row).collect())).lines(lines))
+        .with(Section::new("Phases", "").table(table).lines(lines))
 }
 
 #[cfg(test)]

@@ -1,6 +1,8 @@
 //! The machine on which speed is measured.
 
 use serde::Serialize;
+use trocar_report::table::count;
+use trocar_tissue::Model;
 
 /// The machine.
 #[derive(Clone, Debug, Serialize)]
@@ -10,6 +12,42 @@ pub struct Machine {
     /// Load average over the last minute at the start, if the system reports it. A load above the
     /// number of cores makes the figures too low.
     pub load: Option<f64>,
+}
+
+/// What was stepped, and on what.
+#[derive(Clone, Debug, Serialize)]
+pub struct Setup {
+    /// Number of organs.
+    pub organs: usize,
+    /// Number of nodes.
+    pub nodes: usize,
+    /// Number of elements.
+    pub tets: usize,
+    /// Worker threads.
+    pub threads: usize,
+    /// The machine.
+    pub machine: Machine,
+}
+
+impl Setup {
+    /// The organs of `model` on `threads` threads (0: all) of `machine`.
+    pub fn new(model: &Model, threads: usize, machine: Machine) -> Self {
+        let bodies = model.bodies();
+        Self {
+            organs: bodies.len(),
+            nodes: bodies.iter().map(|b| b.len()).sum(),
+            tets: bodies.iter().map(|b| b.tets().len()).sum(),
+            threads: if threads == 0 { machine.cores } else { threads },
+            machine,
+        }
+    }
+
+    /// A text: sizes, threads and cores.
+    pub fn described(&self) -> String {
+        let (nodes, tets) = (count(self.nodes), count(self.tets));
+        let machine = self.machine.described();
+        format!("{} organs, {nodes} nodes, {tets} tets; {} threads on {machine}", self.organs, self.threads)
+    }
 }
 
 impl Machine {

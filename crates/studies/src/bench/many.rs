@@ -1,13 +1,12 @@
 //! Many small models in parallel, beside one model of the same total size.
 
-use crate::scenes::{self, Organs, Run, Scene, material};
+use crate::scenes::{Organs, Run, Scene, material};
 use crate::statistics::median;
-use crate::study::check_interrupted;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::time::Instant;
 use trocar_core::Progress;
-use trocar_workflow::{SOLVERS, solver_named};
+use trocar_workflow::{SOLVERS, check_interrupted, solver_named};
 
 /// Warm-up frames, and maximum number of timed frames.
 const WARM_UP: usize = 3;
@@ -58,7 +57,7 @@ pub(super) fn measure(
     for name in SOLVERS {
         let schedule = solver_named(name)?;
         for &threads in threads {
-            let mut many = (0..count).map(|_| Run::new(&single, schedule, 1)).collect::<scenes::Result<Vec<_>>>()?;
+            let mut many = (0..count).map(|_| Run::new(&single, schedule, 1)).collect::<Result<Vec<_>>>()?;
             let (mut one, mut large) = (Run::new(&together, schedule, threads)?, Run::new(&six, schedule, threads)?);
             let mut times: [Vec<f64>; 3] = Default::default();
             let whole = Instant::now();
@@ -66,8 +65,8 @@ pub(super) fn measure(
                 check_interrupted(progress)?;
                 let took = [
                     timed(|| step_all(&mut many, threads))?,
-                    timed(|| Ok(one.frame().map(|_| ())?))?,
-                    timed(|| Ok(large.frame().map(|_| ())?))?,
+                    timed(|| one.frame().map(|_| ()))?,
+                    timed(|| large.frame().map(|_| ()))?,
                 ];
                 progress.advance(1);
                 if frame >= WARM_UP {
@@ -102,8 +101,7 @@ pub(super) fn measure(
 fn step_all(runs: &mut [Run<'_>], threads: usize) -> Result<()> {
     let share = runs.len().div_ceil(threads.max(1)).max(1);
     std::thread::scope(|scope| {
-        let step =
-            |part: &mut [Run<'_>]| -> Result<()> { part.iter_mut().try_for_each(|run| Ok(run.frame().map(|_| ())?)) };
+        let step = |part: &mut [Run<'_>]| -> Result<()> { part.iter_mut().try_for_each(|run| run.frame().map(|_| ())) };
         let others: Vec<_> = runs.chunks_mut(share).map(|part| scope.spawn(move || step(part))).collect();
         let lost = || Err(Error::Mismatch("a worker thread panicked".to_owned()));
         others.into_iter().try_for_each(|thread| thread.join().unwrap_or_else(|_| lost()))

@@ -5,7 +5,7 @@ use super::pytetwild::PytetwildMesher;
 use crate::Result;
 use crate::names::Units;
 use crate::scenes::ellipsoid;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -16,6 +16,7 @@ use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
+use trocar_workflow::check_interrupted;
 
 /// Half axes of the default body (m): an ellipsoid of 815 cm3, the volume of the paper's liver.
 const LIVER: [f64; 3] = [0.105, 0.064, 0.029];
@@ -79,8 +80,6 @@ pub struct MeshingResult {
     pub linearity: Option<f64>,
     /// Worker threads.
     pub threads: usize,
-    /// Path of the report.
-    pub report: String,
 }
 
 impl Study for MeshingBench {
@@ -117,7 +116,7 @@ impl Study for MeshingBench {
         let mut of_size: Vec<&MeshingRow> = rows.iter().filter(|r| r.series == "size").collect();
         of_size.sort_by_key(|r| r.tets);
         let linearity = per_tet(of_size.last().copied()).zip(per_tet(of_size.first().copied())).map(|(a, b)| a / b);
-        let result = MeshingResult { linearity, threads: rayon::current_num_threads(), report: job.report(), rows };
+        let result = MeshingResult { linearity, threads: rayon::current_num_threads(), rows };
         let document = document(&result)?;
         Ok((result, document))
     }

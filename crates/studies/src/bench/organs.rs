@@ -4,7 +4,7 @@ use super::machine::Machine;
 use super::timing::Timing;
 use crate::names::{SolverName, kilopascals};
 use crate::scenes::{FRAME, OracleRun, Organs, Run, Scene, material, mean_error, rest_positions, rms_error};
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
@@ -13,7 +13,7 @@ use trocar_core::Progress;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::table::{count, fixed, percent};
 use trocar_tissue::Material;
-use trocar_workflow::solver_named;
+use trocar_workflow::{check_interrupted, solver_named};
 
 /// Frames of the tube scene at which the error is measured.
 const TUBE_FRAMES: [usize; 3] = [15, 30, 60];
@@ -242,25 +242,24 @@ impl Tube {
 }
 
 fn document(r: &OrgansResult) -> Document {
-    let head =
-        ["1/60 s frames", "median (ms)", "worst (ms)", "real time", "iterations", "inverted", "yielded", "fallbacks"];
-    let row = |name: String, t: &Timing| {
-        vec![
-            name,
-            fixed(t.frame_ms_median, 2),
-            fixed(t.frame_ms_worst, 2),
-            format!("{}\u{d7}", fixed(t.real_time_factor, 2)),
-            fixed(t.iterations_per_frame, 0),
-            count(t.inverted),
-            count(t.yielded_substeps),
-            count(t.fallbacks),
-        ]
-    };
-    let rows = vec![
-        row(format!("{} dragged", r.appendix), &r.drag),
-        row("every organ shaken".to_owned(), &r.moving),
-        row("sag from rest".to_owned(), &r.sagging),
+    let rows = [
+        (format!("{} dragged", r.appendix), &r.drag),
+        ("every organ shaken".to_owned(), &r.moving),
+        ("sag from rest".to_owned(), &r.sagging),
     ];
+    let table = Table::of(
+        rows,
+        &[
+            ("1/60 s frames", &|(name, _)| name.clone()),
+            ("median (ms)", &|(_, t)| fixed(t.frame_ms_median, 2)),
+            ("worst (ms)", &|(_, t)| fixed(t.frame_ms_worst, 2)),
+            ("real time", &|(_, t)| format!("{}\u{d7}", fixed(t.real_time_factor, 2))),
+            ("iterations", &|(_, t)| fixed(t.iterations_per_frame, 0)),
+            ("inverted", &|(_, t)| count(t.inverted)),
+            ("yielded", &|(_, t)| count(t.yielded_substeps)),
+            ("fallbacks", &|(_, t)| count(t.fallbacks)),
+        ],
+    );
     let lines = [
         format!(
             "{}: {} organs, {} nodes, {} tets; schedule '{}' ({} substeps), {} threads, {} kernels ({})",
@@ -289,5 +288,5 @@ fn document(r: &OrgansResult) -> Document {
         ),
     ];
     Document::new("Organs", "Speed and error of stepping")
-        .with(Section::new("Six organs", "").table(Table::new(head, rows)).lines(lines))
+        .with(Section::new("Six organs", "").table(table).lines(lines))
 }

@@ -72,8 +72,6 @@ pub struct ScalingResult {
     pub many: Vec<ManyRow>,
     /// The machine.
     pub machine: Machine,
-    /// Path of the report.
-    pub report: String,
 }
 
 impl Study for ScalingBench {
@@ -105,7 +103,7 @@ impl Study for ScalingBench {
             0 => Vec::new(),
             count => many::measure(count, self.small, &self.threads, self.budget, job.progress)?,
         };
-        let result = ScalingResult { rows, many, machine, report: job.report() };
+        let result = ScalingResult { rows, many, machine };
         let document = document(&result)?;
         Ok((result, document))
     }
@@ -128,7 +126,6 @@ impl ScalingBench {
             return Ok(ScalingRow { nodes, ..blank(schedule, threads, tets, why) });
         }
         let timed = Run::new(scene, solver_named(schedule)?, threads)
-            .map_err(Error::from)
             .and_then(|mut run| Timing::of(&mut run, WARM_UP, FRAMES, self.budget, progress));
         let (timing, skipped) = match timed {
             Ok(timing) => (Some(timing), None),
@@ -263,31 +260,19 @@ fn cards(result: &ScalingResult) -> Vec<Card> {
 }
 
 fn many_table(result: &ScalingResult) -> Table {
-    let head = [
-        "Schedule",
-        "Threads",
-        "Models",
-        "Elements",
-        "Many (ms)",
-        "One model (ms)",
-        "Loss",
-        "Six organs (ms)",
-        "Elements of organs",
-        "Loss per element",
-    ];
-    let row = |r: &ManyRow| {
-        vec![
-            r.schedule.clone(),
-            r.threads.to_string(),
-            r.models.to_string(),
-            count(r.tets),
-            fixed(r.many_ms, 2),
-            fixed(r.one_model_ms, 2),
-            percent(r.loss, 1),
-            fixed(r.organs_ms, 2),
-            count(r.organs_tets),
-            percent(r.loss_against_organs, 1),
-        ]
-    };
-    Table::new(head, result.many.iter().map(row).collect())
+    Table::of(
+        &result.many,
+        &[
+            ("Schedule", &|r| r.schedule.clone()),
+            ("Threads", &|r| r.threads.to_string()),
+            ("Models", &|r| r.models.to_string()),
+            ("Elements", &|r| count(r.tets)),
+            ("Many (ms)", &|r| fixed(r.many_ms, 2)),
+            ("One model (ms)", &|r| fixed(r.one_model_ms, 2)),
+            ("Loss", &|r| percent(r.loss, 1)),
+            ("Six organs (ms)", &|r| fixed(r.organs_ms, 2)),
+            ("Elements of organs", &|r| count(r.organs_tets)),
+            ("Loss per element", &|r| percent(r.loss_against_organs, 1)),
+        ],
+    )
 }

@@ -3,10 +3,10 @@
 use crate::Result;
 use crate::scenes::{FRAME, Run};
 use crate::statistics::median;
-use crate::study::check_interrupted;
 use serde::Serialize;
 use std::time::Instant;
 use trocar_core::Progress;
+use trocar_workflow::check_interrupted;
 
 /// Wall times of frames.
 #[derive(Clone, Debug, Default, Serialize)]

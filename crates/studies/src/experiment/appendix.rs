@@ -108,7 +108,6 @@ impl Whole {
         specimen
     }
 
-    /// The scene of a condition.
     pub fn scene(&self, condition: Condition) -> Result<Scene> {
         let mut scene = match condition {
             Condition::Appendix => free_scene(&self.specimen(condition), &self.folder, ORGAN, false)?,
@@ -167,9 +166,6 @@ pub(super) struct LiftTrial {
 
 impl LiftTrial {
     /// Lifts the appendix of `specimen` in `scene`.
-    ///
-    /// # Errors
-    /// An option out of range, an invalid scene, an interruption.
     pub fn run(&self, scene: &Scene, specimen: &Specimen, progress: &dyn Progress) -> Result<Recording> {
         let lift =
             Lift { script: self.script, design: Some(self.design), jaw_force: Some(self.jaw_force), ..Lift::default() };
@@ -184,7 +180,6 @@ impl LiftTrial {
         if stopped { Err(Error::Interrupted) } else { Ok(recording?) }
     }
 
-    /// The name of the design.
     pub fn design_name(&self) -> String {
         design_name(self.design).to_owned()
     }

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::names::SceneChoice;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use crate::trials::{Outcomes, Resumed, resumed};
 use clap::Args;
 use serde::{Deserialize, Serialize};
@@ -15,7 +15,7 @@ use trocar_scene::{Scene, TaskName};
 use trocar_specimen::Specimen;
 use trocar_task::policy::RandomActions;
 use trocar_task::{ArmChannels, End, Episode, Policy};
-use trocar_workflow::scene_specimen;
+use trocar_workflow::{check_interrupted, scene_specimen};
 
 /// Threshold of the RCM deviation (mm). With that of the scene the episode would end early.
 const RCM_THRESHOLD_MM: f64 = 25.0;
@@ -86,10 +86,6 @@ pub struct RandomActionsResult {
     pub unbroken: bool,
     /// Seeds of an earlier run.
     pub resumed: Resumed,
-    /// Wall time (s).
-    pub seconds: f64,
-    /// Path of the report.
-    pub report: String,
 }
 
 impl Study for RandomActionsExperiment {
@@ -119,8 +115,6 @@ impl Study for RandomActionsExperiment {
             unbroken: rows.iter().all(whole),
             rows,
             resumed,
-            seconds: job.seconds(),
-            report: job.report(),
         };
         let document = document(&result);
         Ok((result, document))
@@ -213,42 +207,24 @@ fn document(r: &RandomActionsResult) -> Document {
             .met(good == r.rows.len()),
         Card::new("Joints beyond their limits", count(broken), "over all actions").met(broken == 0),
     ];
-    let head = [
-        "Seed",
-        "Actions",
-        "Diverged",
-        "Inverted",
-        "Stretch",
-        "Smallest volume",
-        "RCM (mm)",
-        "Force (N)",
-        "Contacts disabled",
-        "Contacts of blades disabled",
-        "Relaxed",
-        "Guarded",
-    ];
-    let rows: Vec<Vec<String>> = r
-        .rows
-        .iter()
-        .map(|row| {
-            vec![
-                row.seed.to_string(),
-                count(row.actions),
-                row.diverged.clone().unwrap_or_default(),
-                count(row.inverted_peak),
-                fixed(row.max_stretch, 2),
-                percent(row.min_volume_ratio, 2),
-                fixed(row.rcm_max_mm, 2),
-                fixed(row.force_max_n, 2),
-                count(row.disabled_contacts),
-                count(row.disabled_blades),
-                count(row.relaxed),
-                count(row.guarded),
-            ]
-        })
-        .collect();
-    let seeds = Section::new("Seeds", "").table(Table::new(head, rows)).lines(resumed(&r.resumed, "seeds"));
+    let table = Table::of(
+        &r.rows,
+        &[
+            ("Seed", &|row| row.seed.to_string()),
+            ("Actions", &|row| count(row.actions)),
+            ("Diverged", &|row| row.diverged.clone().unwrap_or_default()),
+            ("Inverted", &|row| count(row.inverted_peak)),
+            ("Stretch", &|row| fixed(row.max_stretch, 2)),
+            ("Smallest volume", &|row| percent(row.min_volume_ratio, 2)),
+            ("RCM (mm)", &|row| fixed(row.rcm_max_mm, 2)),
+            ("Force (N)", &|row| fixed(row.force_max_n, 2)),
+            ("Contacts disabled", &|row| count(row.disabled_contacts)),
+            ("Contacts of blades disabled", &|row| count(row.disabled_blades)),
+            ("Relaxed", &|row| count(row.relaxed)),
+            ("Guarded", &|row| count(row.guarded)),
+        ],
+    );
     Document::new("Random actions", "Failures under random valid actions")
         .with(Section::new("Random actions", lead).cards(cards))
-        .with(seeds)
+        .with(Section::new("Seeds", "").table(table).lines(resumed(&r.resumed, "seeds")))
 }

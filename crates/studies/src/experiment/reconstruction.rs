@@ -16,7 +16,7 @@ use trocar_recording::Recording;
 use trocar_render::phong::PhongScene;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card, Columns};
-use trocar_report::table::{count, fixed, percent};
+use trocar_report::table::{count, fixed, percent, yes_or_no};
 use trocar_report::{colors, figures, overlays};
 use trocar_workflow::pages::check_sizes;
 use trocar_workflow::paper::table_i;
@@ -110,10 +110,6 @@ pub struct ReconstructionResult {
     pub organs: Vec<ReconstructionRow>,
     /// All phantoms.
     pub phantoms: Vec<PhantomFigures>,
-    /// Wall time (s).
-    pub seconds: f64,
-    /// Path of the report.
-    pub report: String,
 }
 
 impl Study for ReconstructionExperiment {
@@ -127,8 +123,7 @@ impl Study for ReconstructionExperiment {
         job.claim()?;
         let record = RecordOptions { sensor: self.sensor.into(), ..self.recorded.options() };
         let settings = Settings { back: self.back.into(), mesher: self.mesher.into(), ..Settings::default() };
-        let mut result =
-            ReconstructionResult { organs: Vec::new(), phantoms: Vec::new(), seconds: 0.0, report: job.report() };
+        let mut result = ReconstructionResult { organs: Vec::new(), phantoms: Vec::new() };
         let mut reconstructions = Vec::new();
         for phantom in &phantoms_or_all(&self.phantoms) {
             let folder = job.output().join(phantom);
@@ -148,7 +143,6 @@ impl Study for ReconstructionExperiment {
             });
             reconstructions.push(reconstruction);
         }
-        result.seconds = job.seconds();
         let document = document(&result, &reconstructions)?;
         Ok((result, document))
     }
@@ -247,70 +241,50 @@ fn summary(result: &ReconstructionResult) -> Section {
 }
 
 fn table_i_beside_paper(result: &ReconstructionResult) -> Section {
-    let head = [
-        "Organ",
-        "Phantom",
-        "Nodes",
-        "(paper)",
-        "Tetrahedra",
-        "(paper)",
-        "Min. dihedral (\u{b0})",
-        "Median dihedral (\u{b0})",
-        "Median edge (mm)",
-        "Watertight",
-        "Inverted",
-        "Depth error (mm)",
-        "signed (mm)",
-        "binary grid, signed (mm)",
-        "against truth (mm)",
-        "Covered",
-        "Volume (cm\u{b3})",
-        "error, model",
-        "error, truth",
-    ];
     let paper = |n: Option<usize>| n.map_or(String::new(), count);
-    let row = |r: &ReconstructionRow| {
-        vec![
-            r.organ.clone(),
-            r.phantom.clone(),
-            count(r.nodes),
-            paper(r.paper_nodes),
-            count(r.tets),
-            paper(r.paper_tets),
-            fixed(r.min_dihedral_deg, 1),
-            fixed(r.median_dihedral_deg, 1),
-            fixed(r.median_edge_mm, 2),
-            if r.watertight { "yes" } else { "no" }.to_owned(),
-            count(r.inverted),
-            fixed(r.depth_error_median_mm, 2),
-            fixed(r.signed_error_median_mm, 2),
-            fixed(r.binary_grid_signed_error_mm.unwrap_or(f64::NAN), 2),
-            fixed(r.truth_error_median_mm, 2),
-            percent(r.covered, 0),
-            fixed(r.volume_cm3, 2),
-            percent(r.volume_error, 1),
-            percent(r.volume_error_truth, 0),
-        ]
-    };
+    let table = Table::of(
+        &result.organs,
+        &[
+            ("Organ", &|r| r.organ.clone()),
+            ("Phantom", &|r| r.phantom.clone()),
+            ("Nodes", &|r| count(r.nodes)),
+            ("(paper)", &|r| paper(r.paper_nodes)),
+            ("Tetrahedra", &|r| count(r.tets)),
+            ("(paper)", &|r| paper(r.paper_tets)),
+            ("Min. dihedral (\u{b0})", &|r| fixed(r.min_dihedral_deg, 1)),
+            ("Median dihedral (\u{b0})", &|r| fixed(r.median_dihedral_deg, 1)),
+            ("Median edge (mm)", &|r| fixed(r.median_edge_mm, 2)),
+            ("Watertight", &|r| yes_or_no(r.watertight)),
+            ("Inverted", &|r| count(r.inverted)),
+            ("Depth error (mm)", &|r| fixed(r.depth_error_median_mm, 2)),
+            ("signed (mm)", &|r| fixed(r.signed_error_median_mm, 2)),
+            ("binary grid, signed (mm)", &|r| fixed(r.binary_grid_signed_error_mm.unwrap_or(f64::NAN), 2)),
+            ("against truth (mm)", &|r| fixed(r.truth_error_median_mm, 2)),
+            ("Covered", &|r| percent(r.covered, 0)),
+            ("Volume (cm\u{b3})", &|r| fixed(r.volume_cm3, 2)),
+            ("error, model", &|r| percent(r.volume_error, 1)),
+            ("error, truth", &|r| percent(r.volume_error_truth, 0)),
+        ],
+    );
     Section::new(
         "Table I",
         "The depth error is the paper's measure: the surface, seen through the recording camera, against the input \
          depth. <i>Error, model</i>: the volume against that between the true front and the modelled back of the \
          paper's closure. <i>Error, truth</i>: against the true organ, whose back is unseen.",
     )
-    .table(Table::new(head, result.organs.iter().map(row).collect()))
+    .table(table)
 }
 
 /// Fig. 6(a): signed depth error of the surfaces.
 fn errors(made: &[Reconstruction]) -> Result<Section> {
     let mut shown = Vec::new();
     for r in made {
-        let mut picture = overlays::dimmed(&r.background);
+        let mut picture = overlays::dimmed(&r.composite.color);
         for organ in &r.organs {
             overlays::error(&mut picture, &organ.depth_error, &organ.compared);
         }
-        let img = figures::img(&picture, "signed depth error of all organs")?;
-        shown.push(page::figure(&img, &format!("<b>{}.</b>", page::escape(&r.specimen.name))));
+        let caption = format!("<b>{}.</b>", page::escape(&r.specimen.name));
+        shown.push(figures::figure(&picture, "signed depth error of all organs", &caption)?);
     }
     let bar = page::scale_bar(&colors::DIVERGING, "\u{2212}5", "surface minus measured depth (mm)", "+5");
     let lead = "Blue: the surface is nearer to the camera than the measured depth; red: farther.";
@@ -319,39 +293,24 @@ fn errors(made: &[Reconstruction]) -> Result<Section> {
 }
 
 fn composites(result: &ReconstructionResult) -> Section {
-    let head = [
-        "Phantom",
-        "Frames",
-        "Recovered (paper 3.4 %)",
-        "Coverage (90.3 %)",
-        "Depth range (2.0 mm)",
-        "Depth error, median",
-        "95th percentile",
-        "under the instruments",
-        "Reconstruction",
-    ];
-    let rows: Vec<Vec<String>> = result
-        .phantoms
-        .iter()
-        .map(|p| {
-            let c = &p.composite;
-            let truth = c.truth.unwrap_or_default();
-            let mm = |v: f64| format!("{} mm", fixed(v, 2));
-            vec![
-                p.phantom.clone(),
-                count(c.frames_used),
-                percent(c.recovered_share, 1),
-                percent(c.coverage, 1),
-                mm(c.depth_range_median_mm),
-                mm(truth.depth_error_median_mm),
-                mm(truth.depth_error_p95_mm),
-                mm(truth.under_instruments_median_mm.unwrap_or(f64::NAN)),
-                format!("{} s", fixed(p.seconds, 1)),
-            ]
-        })
-        .collect();
+    let mm = |v: f64| format!("{} mm", fixed(v, 2));
+    let truth = |p: &PhantomFigures| p.composite.truth.unwrap_or_default();
+    let table = Table::of(
+        &result.phantoms,
+        &[
+            ("Phantom", &|p| p.phantom.clone()),
+            ("Frames", &|p| count(p.composite.frames_used)),
+            ("Recovered (paper 3.4 %)", &|p| percent(p.composite.recovered_share, 1)),
+            ("Coverage (90.3 %)", &|p| percent(p.composite.coverage, 1)),
+            ("Depth range (2.0 mm)", &|p| mm(p.composite.depth_range_median_mm)),
+            ("Depth error, median", &|p| mm(truth(p).depth_error_median_mm)),
+            ("95th percentile", &|p| mm(truth(p).depth_error_p95_mm)),
+            ("under the instruments", &|p| mm(truth(p).under_instruments_median_mm.unwrap_or(f64::NAN))),
+            ("Reconstruction", &|p| format!("{} s", fixed(p.seconds, 1))),
+        ],
+    );
     let lead = "The scene behind the instruments, from the frames of the window, and its error against the truth.";
-    Section::new("Composites", lead).table(Table::new(head, rows))
+    Section::new("Composites", lead).table(table)
 }
 
 /// Input picture and reconstruction side by side.
@@ -360,14 +319,14 @@ fn pictures(made: &[Reconstruction]) -> Result<Section> {
     for r in made {
         let Some(camera) = &r.specimen.camera else { continue };
         let name = page::escape(&r.specimen.name);
-        let input = figures::img(&r.input, "input frame")?;
-        shown.push(page::figure(&input, &format!("<b>{name}.</b> The centre frame of the window.")));
+        let caption = format!("<b>{name}.</b> The centre frame of the window.");
+        shown.push(figures::figure(&r.composite.input, "input frame", &caption)?);
         let scene =
             PhongScene::new(trocar_workflow::pages::organ_views::surfaces(&r.specimen), None, colors::VIEW_GROUND)
                 .with_ambient_occlusion(24, 0.012);
         let rendered = scene.render(camera, &Pose::IDENTITY, 2).color;
-        let rendered = figures::img(&rendered, "reconstructed surfaces through the recording camera")?;
-        shown.push(page::figure(&rendered, "<b>Reconstructed.</b> The surfaces through the recording camera."));
+        let caption = "<b>Reconstructed.</b> The surfaces through the recording camera.";
+        shown.push(figures::figure(&rendered, "reconstructed surfaces through the recording camera", caption)?);
     }
     Ok(Section::new("Pictures", "").figures(shown))
 }

@@ -11,7 +11,7 @@ use trocar_campaign::{
 };
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
-use trocar_report::table::{count, fixed};
+use trocar_report::table::{count, fixed, or_dash};
 use trocar_scene::{Split, VariationSet};
 use trocar_task::policy::POLICIES;
 
@@ -212,10 +212,6 @@ fn document(manifest: &Manifest, r: &RolloutsResult, records: &[EpisodeRecord]) 
     Ok(Document::new("Rollouts", subtitle).with(outcome).with(spread).with(by_controller))
 }
 
-fn or_dash(value: Option<f64>, decimals: usize) -> String {
-    value.map_or("\u{2013}".to_owned(), |v| fixed(v, decimals))
-}
-
 fn beside_paper(r: &RolloutsResult) -> Table {
     let p = &r.paper;
     let of = |n: usize, all: usize| format!("{n} of {all}");
@@ -233,29 +229,18 @@ fn beside_paper(r: &RolloutsResult) -> Table {
 }
 
 fn controllers(rows: &[PolicyRow]) -> Table {
-    let head = [
-        "controller",
-        "rollouts",
-        "passed",
-        "attached",
-        "held",
-        "lift (mm)",
-        "RCM, loaded median (mm)",
-        "RCM, max. (mm)",
-        "diverged",
-    ];
-    let row = |p: &PolicyRow| {
-        vec![
-            p.policy.clone(),
-            count(p.episodes),
-            count(p.passed),
-            count(p.attached),
-            count(p.held_to_end),
-            or_dash(p.lift_median_mm, 1),
-            or_dash(p.rcm_median_mm, 4),
-            or_dash(p.rcm_max_mm, 3),
-            count(p.ends.diverged),
-        ]
-    };
-    Table::new(head, rows.iter().map(row).collect())
+    Table::of(
+        rows,
+        &[
+            ("controller", &|p| p.policy.clone()),
+            ("rollouts", &|p| count(p.episodes)),
+            ("passed", &|p| count(p.passed)),
+            ("attached", &|p| count(p.attached)),
+            ("held", &|p| count(p.held_to_end)),
+            ("lift (mm)", &|p| or_dash(p.lift_median_mm, 1)),
+            ("RCM, loaded median (mm)", &|p| or_dash(p.rcm_median_mm, 4)),
+            ("RCM, max. (mm)", &|p| or_dash(p.rcm_max_mm, 3)),
+            ("diverged", &|p| count(p.ends.diverged)),
+        ],
+    )
 }

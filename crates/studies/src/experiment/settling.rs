@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::names::{Recorded, SolverName, phantoms_or_all};
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use clap::Args;
 use serde::Serialize;
 use trocar_cell::{FRAME, World};
@@ -12,8 +12,8 @@ use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
-use trocar_workflow::phantoms;
 use trocar_workflow::solver_named;
+use trocar_workflow::{check_interrupted, phantoms};
 
 /// Target: every specimen is below this speed (m/s)
 const SETTLED_SPEED: f64 = 0.01;
@@ -95,10 +95,6 @@ pub struct SettlingResult {
     pub phantoms: Vec<SettlingRow>,
     /// Name of the schedule.
     pub schedule: String,
-    /// Wall time (s).
-    pub seconds: f64,
-    /// Path of the report.
-    pub report: String,
 }
 
 impl Study for SettlingExperiment {
@@ -118,12 +114,7 @@ impl Study for SettlingExperiment {
                 phantoms::specimen(phantom, &self.recorded.options(), &job.output().join(phantom), job.progress)?;
             rows.push(released(phantom, World::new(&specimen, schedule, self.threads)?, job.progress)?);
         }
-        let result = SettlingResult {
-            phantoms: rows,
-            schedule: self.schedule.name().to_owned(),
-            seconds: job.seconds(),
-            report: job.report(),
-        };
+        let result = SettlingResult { phantoms: rows, schedule: self.schedule.name().to_owned() };
         let document = document(&result)?;
         Ok((result, document))
     }
@@ -225,49 +216,36 @@ fn document(result: &SettlingResult) -> Result<Document> {
 }
 
 fn beside_paper(result: &SettlingResult) -> Section {
-    let head = [
-        "Phantom",
-        "Nodes",
-        "Tetrahedra",
-        "Pinned",
-        "(paper)",
-        "Peak (m/s)",
-        "After 1 s (m/s)",
-        "(paper)",
-        "Settled after",
-        "Event",
-    ];
-    let rows: Vec<Vec<String>> = result
-        .phantoms
-        .iter()
-        .map(|p| {
-            vec![
-                p.phantom.clone(),
-                count(p.nodes),
-                count(p.tets),
-                percent(p.pinned, 1),
-                p.paper_pinned.map_or(String::new(), |s| percent(s, 1)),
-                fixed(p.peak_speed_m_s, 3),
-                fixed(p.speed_m_s, 4),
-                p.paper_speed_m_s.map_or(String::new(), |s| fixed(s, 3)),
-                p.settled_after_s.map_or("not within 1.5 s".to_owned(), |s| format!("{} s", fixed(s, 2))),
-                p.event.clone().unwrap_or_default(),
-            ]
-        })
-        .collect();
-    Section::new("Beside the paper", "").table(Table::new(head, rows))
+    let settled =
+        |p: &SettlingRow| p.settled_after_s.map_or("not within 1.5 s".to_owned(), |s| format!("{} s", fixed(s, 2)));
+    let table = Table::of(
+        &result.phantoms,
+        &[
+            ("Phantom", &|p| p.phantom.clone()),
+            ("Nodes", &|p| count(p.nodes)),
+            ("Tetrahedra", &|p| count(p.tets)),
+            ("Pinned", &|p| percent(p.pinned, 1)),
+            ("(paper)", &|p| p.paper_pinned.map_or(String::new(), |s| percent(s, 1))),
+            ("Peak (m/s)", &|p| fixed(p.peak_speed_m_s, 3)),
+            ("After 1 s (m/s)", &|p| fixed(p.speed_m_s, 4)),
+            ("(paper)", &|p| p.paper_speed_m_s.map_or(String::new(), |s| fixed(s, 3))),
+            ("Settled after", &|p| settled(p)),
+            ("Event", &|p| p.event.clone().unwrap_or_default()),
+        ],
+    );
+    Section::new("Beside the paper", "").table(table)
 }
 
 fn organs(result: &SettlingResult) -> Section {
-    let head = ["Organ", "Phantom", "Pinned", "Peak (m/s)", "After 1 s (m/s)"];
-    let rows: Vec<Vec<String>> = result
-        .phantoms
-        .iter()
-        .flat_map(|p| p.organs.iter().map(move |o| (p, o)))
-        .map(|(p, o)| {
-            let name = [o.organ.clone(), p.phantom.clone(), percent(o.pinned, 1)];
-            name.into_iter().chain([fixed(o.peak_speed_m_s, 3), fixed(o.speed_m_s, 4)]).collect()
-        })
-        .collect();
-    Section::new("Organs", "").table(Table::new(head, rows).on_page_only())
+    let table = Table::of(
+        result.phantoms.iter().flat_map(|p| p.organs.iter().map(move |o| (p, o))),
+        &[
+            ("Organ", &|(_, o)| o.organ.clone()),
+            ("Phantom", &|(p, _)| p.phantom.clone()),
+            ("Pinned", &|(_, o)| percent(o.pinned, 1)),
+            ("Peak (m/s)", &|(_, o)| fixed(o.peak_speed_m_s, 3)),
+            ("After 1 s (m/s)", &|(_, o)| fixed(o.speed_m_s, 4)),
+        ],
+    );
+    Section::new("Organs", "").table(table.on_page_only())
 }

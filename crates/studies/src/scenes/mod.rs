@@ -5,7 +5,6 @@
 //! [`Scene::moving`], [`Scene::tube`], [`Scene::fall`]. [`Run`] steps it by a solver, [`OracleRun`]
 //! by the oracle.
 
-mod error;
 mod error_norms;
 mod laparoscopic;
 mod organs;
@@ -13,10 +12,10 @@ mod run;
 mod scene;
 mod shapes;
 
-pub use error::{Error, Result};
 pub use error_norms::{mean_error, rms_error};
 pub use laparoscopic::{LaparoscopicScene, view as endoscope_view};
 pub use organs::{Organ, Organs};
+pub(crate) use run::reference;
 pub use run::{OracleRun, Run, grasps, rest_positions, tools};
 pub use scene::{FRAME, Motion, Patch, SCENES, Scene, material};
 pub use shapes::ellipsoid;

@@ -1,13 +1,12 @@
 //! Organs of scenes: read from a mesh file, or procedural.
 
-use super::error::{Error, Result};
 use super::shapes::{self, BentTube};
+use crate::{Error, Result};
 use glam::DVec3;
 use std::path::Path;
 use trocar_geometry::io::read_msh_groups;
 use trocar_geometry::{LatticeMesher, TetMesh};
 
-/// Name of the appendix.
 const APPENDIX: &str = "appendix";
 
 /// Maximum size of an organ (m); a larger one is in another unit.

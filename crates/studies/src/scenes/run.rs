@@ -1,7 +1,7 @@
 //! Runs of a scene by a solver and by the oracle.
 
-use super::error::{Error, Result};
 use super::scene::{FRAME, Patch, Scene};
+use crate::{Error, Result};
 use glam::DVec3;
 use trocar_tissue::{Grasp, Model, SolverSettings, State, StepReport, Stepper, ToolMotion};
 use trocar_tissue_reference::{Held, Oracle, OracleState};
@@ -38,7 +38,7 @@ impl<'a> Run<'a> {
         self.frames += 1;
         match report.divergence {
             None => Ok(report),
-            Some(why) => Err(Error::Diverged { scene: self.scene.name, frame: self.frames, why: why.to_string() }),
+            Some(why) => Err(Error::Study(format!("scene '{}', frame {}: {why}", self.scene.name, self.frames).into())),
         }
     }
 
@@ -60,6 +60,11 @@ pub fn grasps(scene: &Scene, state: &State) -> Vec<Grasp> {
 /// Motions of the tools between two times (s).
 pub fn tools(scene: &Scene, from: f64, to: f64) -> Vec<ToolMotion> {
     scene.patches.iter().map(|p| ToolMotion { from: p.motion.pose(from), to: p.motion.pose(to) }).collect()
+}
+
+/// An error of the oracle or of a comparator, as one of a study.
+pub(crate) fn reference(error: trocar_tissue_reference::Error) -> Error {
+    Error::Study(error.into())
 }
 
 /// A run of a scene by the oracle, substep by substep.
@@ -91,7 +96,7 @@ impl<'a> OracleRun<'a> {
     /// A step that fails.
     pub fn step(&mut self, dt: f64, end: f64) -> Result<()> {
         let held = self.held_between_frames(end);
-        self.oracle.step(&self.scene.model, &mut self.state, dt, &held)?;
+        self.oracle.step(&self.scene.model, &mut self.state, dt, &held).map_err(reference)?;
         Ok(())
     }
 
@@ -111,7 +116,7 @@ impl<'a> OracleRun<'a> {
     /// An equilibrium that is not found.
     pub fn settle(&mut self) -> Result<()> {
         let held = self.held(0.0);
-        self.oracle.settle(&self.scene.model, &mut self.state, &held)?;
+        self.oracle.settle(&self.scene.model, &mut self.state, &held).map_err(reference)?;
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! The scenes: which nodes are pinned, which are carried, and how.
 
-use super::error::{Error, Result};
 use super::organs::{Organ, Organs};
+use crate::{Error, Result};
 use glam::DVec3;
 use std::f64::consts::TAU;
 use trocar_cell::VISCOSITY_TIME;

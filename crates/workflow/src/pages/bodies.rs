@@ -19,24 +19,17 @@ pub(super) fn section(s: &Specimen, beside_paper: bool) -> Result<String> {
     let oblique = View::framing(&points, d.oblique(), d.up, size);
     let low = View::framing(&points, d.low(), d.up, size);
     let rest = organ_views::rest(s);
-    let picture = |view: &View, instances, alt: &str| figures::img(&view.picture(instances, 2), alt);
+    let picture =
+        |view: &View, instances, alt: &str, caption: &str| figures::figure(&view.picture(instances, 2), alt, caption);
     let names = s.organs.iter().enumerate().map(|(i, o)| (o.name.as_str(), colors::organ(i)));
     let wires = format!("<b>Tetrahedra.</b> Outer faces of the simulated bodies.{}", page::legend(names));
     let cut = "<b>Cut-away.</b> Each organ opened by an upright plane through its middle; cut elements are lighter.";
+    let surfaces = || organ_views::surfaces(s);
     let figures = [
-        page::figure(
-            &picture(&oblique, organ_views::surfaces(s), "organ surfaces, oblique view")?,
-            "<b>Surfaces</b> obliquely from the front.",
-        ),
-        page::figure(
-            &picture(&low, organ_views::surfaces(s), "organ surfaces, low view")?,
-            "<b>Surfaces, from low on the other side.</b>",
-        ),
-        page::figure(&picture(&oblique, organ_views::wires(s, &rest, None), "tetrahedral meshes")?, &wires),
-        page::figure(
-            &picture(&oblique, organ_views::wires(s, &rest, Some(d.front)), "tetrahedral meshes, cut open")?,
-            cut,
-        ),
+        picture(&oblique, surfaces(), "organ surfaces, oblique view", "<b>Surfaces</b> obliquely from the front.")?,
+        picture(&low, surfaces(), "organ surfaces, low view", "<b>Surfaces, from low on the other side.</b>")?,
+        picture(&oblique, organ_views::wires(s, &rest, None), "tetrahedral meshes", &wires)?,
+        picture(&oblique, organ_views::wires(s, &rest, Some(d.front)), "tetrahedral meshes, cut open", cut)?,
     ];
     let lead = if beside_paper {
         "Each organ is a watertight surface around a body of tetrahedra. Small figures: the paper\u{2019}s Table I, for \

@@ -1,8 +1,9 @@
 //! The section on a cut and its pieces.
 
 use trocar_cell::SeveredPiece;
+use trocar_report::document::Table;
 use trocar_report::page::{self, Card};
-use trocar_report::table::{self, count, fixed};
+use trocar_report::table::{count, fixed};
 use trocar_task::Severed;
 
 /// The section on the cut `s`.
@@ -41,7 +42,7 @@ pub(super) fn section(s: &Severed) -> String {
         ),
     ]);
     if !c.pieces.is_empty() {
-        body += &pieces(&c.pieces);
+        body += &pieces(&c.pieces).html();
     }
     // A sentence begins with a capital on the page.
     let mut said = c.said.clone();
@@ -51,30 +52,19 @@ pub(super) fn section(s: &Severed) -> String {
     page::section("The cut", &page::escape(&format!("{said}.")), &body)
 }
 
-fn pieces(pieces: &[SeveredPiece]) -> String {
-    let head = [
-        "Piece",
-        "s",
-        "Nodes",
-        "Pinned",
-        "In the jaws",
-        "Elements",
-        "Volume before (mm\u{b3})",
-        "after (mm\u{b3})",
-        "Rise since the cut (mm)",
-    ];
-    let row = |p: &SeveredPiece| {
-        vec![
-            p.name.clone(),
-            format!("{}\u{2013}{}", fixed(p.s_from, 2), fixed(p.s_to, 2)),
-            count(p.nodes),
-            count(p.pinned),
-            count(p.held),
-            count(p.elements),
-            fixed(p.volume_before_mm3, 1),
-            fixed(p.volume_after_mm3, 1),
-            fixed(p.rise_mm, 1),
-        ]
-    };
-    table::plain(&head, &pieces.iter().map(row).collect::<Vec<_>>())
+fn pieces(pieces: &[SeveredPiece]) -> Table {
+    Table::of(
+        pieces,
+        &[
+            ("Piece", &|p| p.name.clone()),
+            ("s", &|p| format!("{}\u{2013}{}", fixed(p.s_from, 2), fixed(p.s_to, 2))),
+            ("Nodes", &|p| count(p.nodes)),
+            ("Pinned", &|p| count(p.pinned)),
+            ("In the jaws", &|p| count(p.held)),
+            ("Elements", &|p| count(p.elements)),
+            ("Volume before (mm\u{b3})", &|p| fixed(p.volume_before_mm3, 1)),
+            ("after (mm\u{b3})", &|p| fixed(p.volume_after_mm3, 1)),
+            ("Rise since the cut (mm)", &|p| fixed(p.rise_mm, 1)),
+        ],
+    )
 }

@@ -3,22 +3,17 @@
 use super::over_time::{self, TimePlot};
 use crate::Result;
 use crate::recorder::Pictures;
+use trocar_report::document::Table;
 use trocar_report::page::{self, Card, Columns};
 use trocar_report::plots::Band;
-use trocar_report::table::{self, fixed};
+use trocar_report::table::{fixed, or_dash, yes_or_no};
 use trocar_scene::TaskName;
-use trocar_task::{ArmChannels, ArmSummary, Channels, Recording, StageProgress, Summary};
+use trocar_task::{ArmChannels, Channels, Recording, StageProgress, Summary};
 
 /// Selects the channels of one arm.
 type ArmOf = fn(&Channels) -> &ArmChannels;
-/// A value of one row.
-type Value = Box<dyn Fn(&Channels) -> f64>;
-
 /// The page of the episode `recording` with its `pictures`. `real_time_factor` is simulated time
 /// over wall time.
-///
-/// # Errors
-/// A plot or picture that cannot be drawn.
 pub(crate) fn episode(recording: &Recording, pictures: &Pictures, real_time_factor: f64) -> Result<String> {
     let (info, s) = (&recording.info, &recording.summary);
     let title = format!("{}: {}", info.scene, info.task.name());
@@ -84,52 +79,40 @@ fn cards(recording: &Recording, real_time_factor: f64) -> String {
 }
 
 fn stages(s: &Summary) -> String {
-    let row = |p: &StageProgress| {
-        let time = p.time_s.map_or("\u{2013}".to_owned(), |t| fixed(t, 2));
-        vec![p.stage.clone(), if p.passed { "yes" } else { "no" }.to_owned(), time, fixed(100.0 * p.share, 0)]
-    };
-    let rows: Vec<Vec<String>> = s.progress.stages.iter().map(row).collect();
+    let table = Table::of(
+        &s.progress.stages,
+        &[
+            ("Stage", &|p| p.stage.clone()),
+            ("Passed", &|p| yes_or_no(p.passed)),
+            ("Time (s)", &|p| or_dash(p.time_s, 2)),
+            ("Share (%)", &|p| fixed(100.0 * p.share, 0)),
+        ],
+    );
     let lead = "Stages pass in order. Share: progress towards passing the stage.";
-    page::section("Stages", lead, &table::plain(&["Stage", "Passed", "Time (s)", "Share (%)"], &rows))
+    page::section("Stages", lead, &table.html())
 }
 
 fn arms(recording: &Recording) -> String {
-    let head = [
-        "Arm",
-        "Under load (s)",
-        "RCM under load, median (mm)",
-        "95% (mm)",
-        "Largest (mm)",
-        "Whole episode (mm)",
-        "Lag (ms)",
-        "Contact (N)",
-        "Constraint (N)",
-        "Jaw (N)",
-        "Tilt (\u{b0})",
-        "Periods without contact",
-        "Commands shortened",
-    ];
-    let or_dash = |v: Option<f64>, decimals: usize| v.map_or("\u{2013}".to_owned(), |v| fixed(v, decimals));
-    let row = |a: &ArmSummary| {
-        vec![
-            a.arm.clone(),
-            fixed(a.loaded_s, 1),
-            or_dash(a.rcm_median_mm, 3),
-            or_dash(a.rcm_p95_mm, 3),
-            or_dash(a.rcm_max_mm, 3),
-            fixed(a.rcm_peak_mm, 3),
-            or_dash(a.lag_ms, 0),
-            fixed(a.peak_contact_n, 2),
-            fixed(a.peak_constraint_n, 2),
-            fixed(a.peak_jaw_n, 2),
-            fixed(a.tilt_max_deg, 1),
-            (a.contact_disabled + a.blades_disabled).to_string(),
-            a.guarded.to_string(),
-        ]
-    };
-    let rows: Vec<Vec<String>> = recording.summary.arms.iter().map(row).collect();
+    let table = Table::of(
+        &recording.summary.arms,
+        &[
+            ("Arm", &|a| a.arm.clone()),
+            ("Under load (s)", &|a| fixed(a.loaded_s, 1)),
+            ("RCM under load, median (mm)", &|a| or_dash(a.rcm_median_mm, 3)),
+            ("95% (mm)", &|a| or_dash(a.rcm_p95_mm, 3)),
+            ("Largest (mm)", &|a| or_dash(a.rcm_max_mm, 3)),
+            ("Whole episode (mm)", &|a| fixed(a.rcm_peak_mm, 3)),
+            ("Lag (ms)", &|a| or_dash(a.lag_ms, 0)),
+            ("Contact (N)", &|a| fixed(a.peak_contact_n, 2)),
+            ("Constraint (N)", &|a| fixed(a.peak_constraint_n, 2)),
+            ("Jaw (N)", &|a| fixed(a.peak_jaw_n, 2)),
+            ("Tilt (\u{b0})", &|a| fixed(a.tilt_max_deg, 1)),
+            ("Periods without contact", &|a| (a.contact_disabled + a.blades_disabled).to_string()),
+            ("Commands shortened", &|a| a.guarded.to_string()),
+        ],
+    );
     let lead = "Forces are peaks. A dash: the arm was never under load, or never without load.";
-    page::section("Arms", lead, &table::plain(&head, &rows))
+    page::section("Arms", lead, &table.html())
 }
 
 /// A band per stage, until the time at which it passed.
@@ -160,18 +143,13 @@ fn plots(recording: &Recording) -> Result<String> {
         .into_iter()
         .filter(|(name, ..)| has(name))
         .collect();
+    let figure = |title: &str, y: &str, curves: &[over_time::Curve<'_>], caption: &str, limits: Vec<f64>| {
+        TimePlot { title, y, curves, caption, limits }.figure(channels, bands(&recording.summary))
+    };
     let both = |title: &str, y: &str, value: fn(&ArmChannels) -> f64, caption: &str, limits: Vec<f64>| {
-        let of: Vec<(&str, Value, usize)> = sides
-            .iter()
-            .map(|(name, arm, color)| {
-                let arm = *arm;
-                let of: Value = Box::new(move |c| value(arm(c)));
-                (*name, of, *color)
-            })
-            .collect();
-        let curves: Vec<over_time::Curve<'_>> =
-            of.iter().map(|(name, of, color)| (*name, of.as_ref(), *color)).collect();
-        TimePlot { title, y, curves: &curves, caption, limits }.figure(channels, bands(&recording.summary))
+        let of: Vec<_> = sides.iter().map(|(name, arm, color)| (*name, move |c: &_| value(arm(c)), *color)).collect();
+        let curves: Vec<over_time::Curve<'_>> = of.iter().map(|(name, of, color)| (*name, of as _, *color)).collect();
+        figure(title, y, &curves, caption, limits)
     };
     let task: Vec<over_time::Curve<'_>> = if recording.info.task == TaskName::PortReach {
         vec![
@@ -191,8 +169,7 @@ fn plots(recording: &Recording) -> Result<String> {
     let near = recording.summary.rcm_peak_mm > 0.5 * recording.info.rcm_threshold_mm;
     let limits = if near { vec![recording.info.rcm_threshold_mm] } else { vec![] };
     let all = [
-        TimePlot { title, y: "distance (mm)", curves: &task, caption, limits: vec![] }
-            .figure(channels, bands(&recording.summary))?,
+        figure(title, "distance (mm)", &task, caption, vec![])?,
         both("Jaw", "opening (1)", |a| a.jaw, "0: closed, 1: wide open.", vec![])?,
         both("Contact force", "force (N)", ArmChannels::contact_n, "force of tissue on the instrument.", vec![])?,
         both(
@@ -216,14 +193,13 @@ fn plots(recording: &Recording) -> Result<String> {
             "distance of the tip from its command at the same time.",
             vec![],
         )?,
-        TimePlot {
-            title: "Smallest volume ratio",
-            y: "volume ratio (1)",
-            curves: &[("tissue", &|c| c.task.min_volume, 4)],
-            caption: "volume of the most compressed element over its volume at rest; at 0 an element is inverted.",
-            limits: vec![],
-        }
-        .figure(channels, bands(&recording.summary))?,
+        figure(
+            "Smallest volume ratio",
+            "volume ratio (1)",
+            &[("tissue", &|c| c.task.min_volume, 4)],
+            "volume of the most compressed element over its volume at rest; at 0 an element is inverted.",
+            vec![],
+        )?,
     ];
     Ok(page::section("Over time", "Shaded: the next stage.", &page::grid(Columns::Two, &all)))
 }

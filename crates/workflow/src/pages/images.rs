@@ -18,13 +18,17 @@ use trocar_report::{figures, overlays};
 /// # Errors
 /// Names the image of another size.
 pub fn check_sizes(r: &Reconstruction) -> Result<()> {
-    let size = (r.input.width, r.input.height);
+    let size = (r.composite.input.width, r.composite.input.height);
     let pixels = size.0 * size.1;
     let mut images = vec![
-        ("input", (r.input.width, r.input.height), r.input.pixels.len()),
-        ("instrument mask", (r.instruments.width, r.instruments.height), r.instruments.set.len()),
-        ("composite", (r.background.width, r.background.height), r.background.pixels.len()),
-        ("composite depth", (r.depth.width, r.depth.height), r.depth.depth.len()),
+        ("input", (r.composite.input.width, r.composite.input.height), r.composite.input.pixels.len()),
+        (
+            "instrument mask",
+            (r.composite.instruments.width, r.composite.instruments.height),
+            r.composite.instruments.set.len(),
+        ),
+        ("composite", (r.composite.color.width, r.composite.color.height), r.composite.color.pixels.len()),
+        ("composite depth", (r.composite.depth.width, r.composite.depth.height), r.composite.depth.depth.len()),
     ];
     for o in &r.organs {
         images.push((&o.name, (o.mask.width, o.mask.height), o.mask.set.len()));
@@ -50,14 +54,18 @@ pub(super) fn overview(r: &Reconstruction) -> String {
     let errors: Vec<f64> = facts().filter_map(|f| f.depth_error_median_mm).collect();
     let worst = errors.iter().copied().fold(f64::NAN, f64::max);
     let cards = [
-        Card::new("Recovered under instruments", percent(r.recovered_share, 1), "of the image; paper 3.4\u{202f}%"),
-        Card::new("Depth coverage", percent(r.coverage, 1), "of the pixels; paper 90.3\u{202f}%"),
+        Card::new(
+            "Recovered under instruments",
+            percent(r.composite.recovered_share, 1),
+            "of the image; paper 3.4\u{202f}%",
+        ),
+        Card::new("Depth coverage", percent(r.composite.coverage, 1), "of the pixels; paper 90.3\u{202f}%"),
         Card::new(
             "Depth spread",
-            format!("{} mm", fixed(1e3 * r.depth_range_median, 2)),
+            format!("{} mm", fixed(1e3 * r.composite.depth_range_median, 2)),
             "10th to 90th percentile, median pixel; paper 2.0 mm",
         ),
-        Card::new("Frames used", table::count(r.frames_used), "in the composite"),
+        Card::new("Frames used", table::count(r.composite.frames_used), "in the composite"),
         Card::new("Depth error", format!("{} mm", fixed(worst, 2)), "median of the organ that fits worst"),
         judged(Card::new("Watertight", format!("{tight} of {organs}"), "organs"), tight == organs, doubtful),
         judged(Card::new("Inverted elements", table::count(inverted), "over all organs"), inverted == 0, doubtful),
@@ -73,45 +81,46 @@ fn judged(card: Card, met: bool, doubtful: bool) -> Card {
 
 /// Input, composite, masks, and the surfaces through the recording camera.
 pub(super) fn images(r: &Reconstruction) -> Result<String> {
-    let mut input = r.input.clone();
-    overlays::outline(&mut input, &r.instruments, INSTRUMENT);
-    let input = page::figure(
-        &figures::img(&input, "input frame with the instruments outlined")?,
-        &format!(
-            "<b>Input.</b> The recorded frame at the window's centre.{}",
-            page::legend([("instruments", INSTRUMENT)])
-        ),
-    );
-    let composite = page::figure(
-        &figures::img(&r.background, "composite without instruments")?,
+    let mut input = r.composite.input.clone();
+    overlays::outline(&mut input, &r.composite.instruments, INSTRUMENT);
+    let legend = page::legend([("instruments", INSTRUMENT)]);
+    let input = figures::figure(
+        &input,
+        "input frame with the instruments outlined",
+        &format!("<b>Input.</b> The recorded frame at the window's centre.{legend}"),
+    )?;
+    let composite = figures::figure(
+        &r.composite.color,
+        "composite without instruments",
         &format!(
             "<b>Composite.</b> Per-pixel median of {} frames, instruments removed; pixels that were never visible are empty.",
-            table::count(r.frames_used)
+            table::count(r.composite.frames_used)
         ),
-    );
-    let mut masked = r.background.clone();
+    )?;
+    let mut masked = r.composite.color.clone();
     for (i, organ) in r.organs.iter().enumerate() {
         overlays::tint(&mut masked, &organ.mask, colors::organ(i), 0.42);
         overlays::outline(&mut masked, &organ.mask, colors::organ(i));
     }
     let names = r.organs.iter().enumerate().map(|(i, o)| (o.name.as_str(), colors::organ(i)));
-    let masked = page::figure(
-        &figures::img(&masked, "organ masks over the composite")?,
+    let masked = figures::figure(
+        &masked,
+        "organ masks over the composite",
         &format!("<b>Masks.</b> Each organ has this colour in all figures.{}", page::legend(names)),
-    );
+    )?;
     let mut top = vec![input, composite, depth_figure(r)?, masked];
     if let Some(camera) = &r.specimen.camera {
         let scene = PhongScene::new(organ_views::surfaces(&r.specimen), None, colors::VIEW_GROUND)
             .with_ambient_occlusion(24, 0.012);
         let rendered = scene.render(camera, &Pose::IDENTITY, 2).color;
-        let rendered = figures::img(&rendered, "reconstructed surfaces through the recording camera")?;
-        let photograph = figures::img(&r.background, "composite, for comparison")?;
-        top.push(page::figure(&photograph, "<b>Composite,</b> for comparison."));
-        top.push(page::figure(
+        let caption = "<b>Composite,</b> for comparison.";
+        top.push(figures::figure(&r.composite.color, "composite, for comparison", caption)?);
+        top.push(figures::figure(
             &rendered,
+            "reconstructed surfaces through the recording camera",
             "<b>Surfaces through the recording camera,</b> rendered with its lens; they should lie where the \
              photograph shows them.",
-        ));
+        )?);
     }
     Ok(page::section(
         "What the camera saw",
@@ -122,13 +131,17 @@ pub(super) fn images(r: &Reconstruction) -> Result<String> {
 }
 
 fn depth_figure(r: &Reconstruction) -> Result<String> {
-    let valid: Vec<f64> = r.depth.depth.iter().filter(|d| **d > 0.0).map(|d| f64::from(*d)).collect();
+    let valid: Vec<f64> = r.composite.depth.depth.iter().filter(|d| **d > 0.0).map(|d| f64::from(*d)).collect();
     // The ends are percentiles, so that stray depths do not stretch the colour scale.
     let low = quantile(&valid, 0.005).unwrap_or(0.0);
     let high = quantile(&valid, 0.995).unwrap_or(1.0);
-    let img = figures::img(&overlays::depth(&r.depth, (low, high)), "composite depth in false colours")?;
     let bar = page::scale_bar(&SEQUENTIAL, &fixed(1e3 * low, 0), "depth (mm)", &fixed(1e3 * high, 0));
-    Ok(page::figure(&img, &format!("<b>Composite depth.</b> Distance along the view; black: no depth.{bar}")))
+    let caption = format!("<b>Composite depth.</b> Distance along the view; black: no depth.{bar}");
+    Ok(figures::figure(
+        &overlays::depth(&r.composite.depth, (low, high)),
+        "composite depth in false colours",
+        &caption,
+    )?)
 }
 
 /// Depth errors of the surfaces: their distance before or behind the depth they were made from.
@@ -136,29 +149,30 @@ pub(super) fn depth_errors(r: &Reconstruction) -> Result<String> {
     if r.organs.is_empty() {
         return Ok(String::new());
     }
-    let ground = overlays::dimmed(&r.background);
+    let ground = overlays::dimmed(&r.composite.color);
     let mut all = ground.clone();
     for organ in &r.organs {
         overlays::error(&mut all, &organ.depth_error, &organ.compared);
     }
     let bar = page::scale_bar(&DIVERGING, "\u{2212}5", "surface minus measured depth (mm)", "+5");
-    let map = page::figure(
-        &figures::img(&all, "signed depth error of all organs")?,
+    let map = figures::figure(
+        &all,
+        "signed depth error of all organs",
         &format!("<b>Depth error.</b> Blue: the surface is nearer to the camera than measured; red: farther.{bar}"),
-    );
+    )?;
     let names = r.organs.iter().enumerate().map(|(i, o)| (o.name.as_str(), colors::organ(i)));
-    let spread = page::figure(
-        &histogram(r)?,
+    let spread = histogram(
+        r,
         &format!("<b>Spread.</b> Share of an organ's compared pixels in bins of 0.25 mm.{}", page::legend(names)),
-    );
+    )?;
     let mut each = Vec::new();
     for (i, organ) in r.organs.iter().enumerate() {
         let mut picture = ground.clone();
         overlays::error(&mut picture, &organ.depth_error, &organ.compared);
         overlays::outline(&mut picture, &organ.mask, colors::organ(i));
         let Some(part) = overlays::crop_box(&organ.mask, 12, 1.5) else { continue };
-        let img = figures::img(&overlays::crop(&picture, part), &format!("signed depth error of {}", organ.name))?;
-        each.push(page::figure(&img, &error_caption(organ)));
+        let alt = format!("signed depth error of {}", organ.name);
+        each.push(figures::figure(&overlays::crop(&picture, part), &alt, &error_caption(organ))?);
     }
     Ok(page::section(
         "Fit of the surfaces to the depth",
@@ -185,7 +199,7 @@ fn errors_mm(organ: &trocar_reconstruct::OrganView) -> Vec<f64> {
     compared.map(|(e, _)| 1e3 * f64::from(*e)).collect()
 }
 
-fn histogram(r: &Reconstruction) -> Result<String> {
+fn histogram(r: &Reconstruction, caption: &str) -> Result<String> {
     const SPAN: f64 = 6.0;
     const BIN: f64 = 0.25;
     let bins = (2.0 * SPAN / BIN) as usize;
@@ -200,18 +214,15 @@ fn histogram(r: &Reconstruction) -> Result<String> {
         }
         let share = |n: usize| 100.0 * n as f64 / errors.len().max(1) as f64;
         let points = counts.iter().enumerate().map(|(b, n)| ((b as f64 + 0.5) * BIN - SPAN, share(*n))).collect();
-        Line { points, color: colors::organ(i), filled: false }
+        Line::new(points, colors::organ(i))
     };
     let plot = Plot {
         title: "distribution of the depth error",
         x: "surface minus measured depth (mm)",
         y: "share of pixels (%)",
         lines: r.organs.iter().enumerate().map(line).collect(),
-        bands: vec![],
         show: vec![0.0],
-        limits: vec![],
-        log_x: false,
-        log_y: false,
+        ..Plot::default()
     };
-    Ok(plot.svg()?)
+    Ok(plot.figure(caption)?)
 }

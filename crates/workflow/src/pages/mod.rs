@@ -86,9 +86,6 @@ pub fn surface(s: &Specimen, repair: &RepairReport) -> Result<String> {
 
 /// The page of a lift. `before` are sections to insert after the outcome, such as
 /// [`reconstruction_sections`].
-///
-/// # Errors
-/// A picture or plot that cannot be made.
 pub(crate) fn lift(s: &Specimen, lifted: &FinishedLift, before: Option<&str>) -> Result<String> {
     let (outcome, details) = lift::sections(lifted)?;
     let body = match before {

@@ -2,7 +2,7 @@
 
 use crate::paper::{PaperOrgan, TABLE_I, table_i};
 use std::fmt::Write;
-use trocar_report::table::{count, fixed, percent};
+use trocar_report::table::{count, fixed, or_dash, percent};
 use trocar_report::{colors, page};
 use trocar_specimen::{Organ, Specimen};
 
@@ -56,12 +56,11 @@ fn organ_row(out: &mut String, index: usize, organ: &Organ, paper: Option<&Paper
         count(facts.inverted),
     );
     if seen {
-        let number = |v: Option<f64>| fixed(v.unwrap_or(f64::NAN), 2);
         let _ = write!(
             out,
             "<td>{}</td><td>{}</td><td>{}</td>",
-            number(facts.depth_error_median_mm),
-            number(facts.depth_error_signed_mm),
+            or_dash(facts.depth_error_median_mm, 2),
+            or_dash(facts.depth_error_signed_mm, 2),
             facts.covered.map_or("\u{2013}".to_owned(), |c| percent(c, 0))
         );
     }

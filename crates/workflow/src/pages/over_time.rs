@@ -4,9 +4,10 @@ use crate::Result;
 use crate::recorder::Pictures;
 use serde::Serialize;
 use trocar_cell::CellEvent;
+use trocar_report::document::Table;
 use trocar_report::page::{self, Card, Columns};
 use trocar_report::plots::{Band, Line, Plot};
-use trocar_report::table::{self, fixed};
+use trocar_report::table::fixed;
 use trocar_report::{colors, figures};
 use trocar_task::{ArmSummary, Channels, Summary};
 
@@ -26,14 +27,9 @@ pub(super) struct TimePlot<'a> {
 
 impl TimePlot<'_> {
     /// The plot of `channels` over `bands`.
-    ///
-    /// # Errors
-    /// A plot that cannot be drawn.
     pub fn figure(self, channels: &[Channels], bands: Vec<Band>) -> Result<String> {
-        let line = |(_, value, color): &Curve<'_>| Line {
-            points: channels.iter().map(|c| (c.time_s, value(c))).collect(),
-            color: colors::organ(*color),
-            filled: false,
+        let line = |(_, value, color): &Curve<'_>| {
+            Line::new(channels.iter().map(|c| (c.time_s, value(c))).collect(), colors::organ(*color))
         };
         let plot = Plot {
             title: self.title,
@@ -43,11 +39,10 @@ impl TimePlot<'_> {
             bands,
             show: vec![0.0],
             limits: self.limits,
-            log_x: false,
-            log_y: false,
+            ..Plot::default()
         };
         let legend = page::legend(self.curves.iter().map(|(name, _, color)| (*name, colors::organ(*color))));
-        Ok(page::figure(&plot.svg()?, &format!("<b>{}</b>: {}{legend}", self.title, self.caption)))
+        Ok(plot.figure(&format!("<b>{}</b>: {}{legend}", self.title, self.caption))?)
     }
 }
 
@@ -69,9 +64,6 @@ pub(super) fn suspensions_card(s: &Summary) -> Card {
 }
 
 /// The section of pictures; empty without pictures.
-///
-/// # Errors
-/// A picture that cannot be encoded.
 pub(super) fn pictures(pictures: &Pictures) -> Result<String> {
     let mut all = Vec::new();
     if let Some((bytes, size)) = &pictures.video {
@@ -79,7 +71,7 @@ pub(super) fn pictures(pictures: &Pictures) -> Result<String> {
         all.push(page::figure(&img, "<b>The lift</b> in real time."));
     }
     for (caption, picture) in &pictures.stills {
-        all.push(page::figure(&figures::img(picture, caption)?, &format!("<b>{}</b>", page::escape(caption))));
+        all.push(figures::figure(picture, caption, &format!("<b>{}</b>", page::escape(caption)))?);
     }
     if all.is_empty() {
         return Ok(String::new());
@@ -94,7 +86,7 @@ pub(super) fn events(events: &[(f64, CellEvent)]) -> String {
     if rows.is_empty() {
         return page::section("Events", "None: no grasp and no cut.", "");
     }
-    page::section("Events", "", &table::plain(&["Time (s)", "Event"], &rows))
+    page::section("Events", "", &Table::new(["Time (s)", "Event"], rows).html())
 }
 
 /// The section of all numbers, texts and flags of `result` by key. Figures that were not measured
@@ -109,5 +101,5 @@ pub(super) fn all_figures(result: &impl Serialize) -> String {
     };
     let row = |(key, value): (String, serde_json::Value)| vec![key, text(value)];
     let rows: Vec<Vec<String>> = simple.map(row).collect();
-    page::section("All figures", "", &table::plain(&["Figure", "Value"], &rows))
+    page::section("All figures", "", &Table::new(["Figure", "Value"], rows).html())
 }

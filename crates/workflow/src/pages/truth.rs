@@ -5,23 +5,21 @@ use crate::truth::{Part, Truth};
 use std::path::Path;
 use trocar_camera::{DepthImage, Mask};
 use trocar_reconstruct::Reconstruction;
+use trocar_report::document::Table;
 use trocar_report::overlays;
 use trocar_report::page::{self, Columns};
 use trocar_report::{colors::DIVERGING, figures, table};
 
 /// The section; empty if `dir` (the folder of the truth, or the recording with it as `truth/`)
 /// has neither `color.png` nor `depth.png`.
-///
-/// # Errors
-/// Names the file when it is unreadable or of another size than the composite.
 pub(super) fn section(r: &Reconstruction, dir: &Path) -> Result<String> {
     let Some(truth) = Truth::read(r, dir)? else { return Ok(String::new()) };
     let (color, depth) = (&truth.color, &truth.depth);
     let parts = truth.parts(r);
     let mut figures = Vec::new();
     if let Some(truth) = color {
-        let img = figures::img(truth, "truth, seen without instruments")?;
-        figures.push(page::figure(&img, "<b>Truth.</b> The phantom without instruments and without noise."));
+        let caption = "<b>Truth.</b> The phantom without instruments and without noise.";
+        figures.push(figures::figure(truth, "truth, seen without instruments", caption)?);
     }
     if let Some(truth) = depth {
         figures.push(error_map(r, truth)?);
@@ -40,22 +38,21 @@ pub(super) fn section(r: &Reconstruction, dir: &Path) -> Result<String> {
         "Composite against the truth",
         "The exact view of the phantom without instruments is known, so the composite can be checked, also under the \
          instruments. Colour differences are of 255 levels.",
-        &(page::grid(Columns::Two, &figures) + &table::plain(&head, &rows)),
+        &(page::grid(Columns::Two, &figures) + &Table::new(head, rows).html()),
     ))
 }
 
 fn error_map(r: &Reconstruction, truth: &DepthImage) -> Result<String> {
-    let mut picture = overlays::dimmed(&r.background);
-    let pairs = || r.depth.depth.iter().zip(&truth.depth);
+    let mut picture = overlays::dimmed(&r.composite.color);
+    let pairs = || r.composite.depth.depth.iter().zip(&truth.depth);
     let compared =
         Mask { width: truth.width, height: truth.height, set: pairs().map(|(a, b)| *a > 0.0 && *b > 0.0).collect() };
     let error: Vec<f32> = pairs().map(|(a, b)| a - b).collect();
     overlays::error(&mut picture, &error, &compared);
-    overlays::outline(&mut picture, &r.instruments, trocar_report::colors::INSTRUMENT);
-    let img = figures::img(&picture, "depth error of the composite")?;
+    overlays::outline(&mut picture, &r.composite.instruments, trocar_report::colors::INSTRUMENT);
     let bar = page::scale_bar(&DIVERGING, "\u{2212}5", "composite minus true depth (mm)", "+5");
     let caption = "<b>Depth error of the composite.</b> Outlined: the instruments of the centre frame.";
-    Ok(page::figure(&img, &format!("{caption}{bar}")))
+    Ok(figures::figure(&picture, "depth error of the composite", &format!("{caption}{bar}"))?)
 }
 
 fn row(part: &Part) -> Vec<String> {

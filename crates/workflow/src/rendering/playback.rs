@@ -2,7 +2,7 @@
 
 use super::script::ScriptedLift;
 use crate::episode_replay::EpisodeReplay;
-use crate::{Error, Result};
+use crate::{Error, Result, check_interrupted};
 use trocar_cell::Cell;
 use trocar_core::Progress;
 
@@ -65,9 +65,6 @@ impl Playback for EpisodeReplay<'_> {
 }
 
 /// Advances to a time (s), or to the end.
-///
-/// # Errors
-/// A time after the end, a step that fails, an interruption.
 pub(crate) fn until(play: &mut dyn Playback, time: Option<f64>, progress: &dyn Progress) -> Result<()> {
     let periods = play.periods();
     let period = play.cell().period();
@@ -75,9 +72,7 @@ pub(crate) fn until(play: &mut dyn Playback, time: Option<f64>, progress: &dyn P
     let total = wanted.or(periods).map_or(1, |n| n.min(periods.unwrap_or(n)) as u64);
     stage(progress, "simulate", total, || {
         while time.is_none_or(|time| play.cell().time() < time - 1e-9) {
-            if progress.interrupted() {
-                return Err(Error::Interrupted);
-            }
+            check_interrupted(progress)?;
             if !play.advance()? {
                 let (Some(time), end) = (time, play.cell().time()) else { break };
                 let name = play.name();

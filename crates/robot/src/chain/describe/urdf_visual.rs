@@ -113,7 +113,6 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         Ok(self.source.numbers::<4>(node, "rgba")?.map_or(Some(DEFAULT_COLOR), opaque))
     }
 
-    /// The path of a mesh file.
     fn file(&self, name: &str) -> std::result::Result<PathBuf, String> {
         let folder = self.source.path.parent().unwrap_or(Path::new(""));
         let Some(inside) = name.strip_prefix("package://") else {

@@ -9,7 +9,7 @@ use super::machine::Machine;
 use crate::Result;
 use crate::scenes::{LaparoscopicScene, endoscope_view};
 use crate::statistics::median;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -24,8 +24,8 @@ use trocar_report::document::{Document, Section, Table};
 use trocar_report::table::{count, fixed};
 use trocar_scene::Scene;
 use trocar_sensors::CameraRig;
-use trocar_workflow::ScriptedLift;
 use trocar_workflow::scene_specimen;
+use trocar_workflow::{ScriptedLift, check_interrupted};
 
 /// Index of the organ that deforms.
 const MOVING: usize = 1;
@@ -260,8 +260,7 @@ impl Study for RenderBench {
         let loops_refit_ms = set.refit()?;
         step()?;
         let whole = rays::merged(&set.scene.organs);
-        let (mut rays, embree_failure) = rays::measure(&whole, &set.view, self.rays, &self.python)?;
-        rays.shrink_to_fit();
+        let (rays, embree_failure) = rays::measure(&whole, &set.view, self.rays, &self.python)?;
         step()?;
         let path_720p_ms = if self.samples > 0 { Some(self.path(&mut set)?) } else { None };
         step()?;
@@ -415,18 +414,18 @@ fn document(r: &RenderBenchResult) -> Document {
     lines.extend(r.embree_failure.as_ref().map(|why| format!("Embree: {why}")));
     let dash = || "\u{2013}".to_owned();
     let million = |x: Option<f64>| x.map_or_else(dash, |x| fixed(1e-6 * x, 2));
-    let rays = r.rays.iter().map(|row| {
-        vec![
-            row.kind.to_owned(),
-            count(row.rays),
-            million(Some(row.rays_per_second)),
-            million(row.embree_rays_per_second),
-            row.ratio.map_or_else(dash, |x| fixed(x, 2)),
-            row.differing.map_or_else(dash, count),
-            row.largest_difference_m.map_or_else(dash, |x| fixed(1e6 * x, 2)),
-        ]
-    });
-    let head = ["Rays", "count", "ours (M/s)", "Embree (M/s)", "ratio", "differ", "largest difference (\u{b5}m)"];
+    let rays = Table::of(
+        &r.rays,
+        &[
+            ("Rays", &|row| row.kind.to_owned()),
+            ("count", &|row| count(row.rays)),
+            ("ours (M/s)", &|row| million(Some(row.rays_per_second))),
+            ("Embree (M/s)", &|row| million(row.embree_rays_per_second)),
+            ("ratio", &|row| row.ratio.map_or_else(dash, |x| fixed(x, 2))),
+            ("differ", &|row| row.differing.map_or_else(dash, count)),
+            ("largest difference (\u{b5}m)", &|row| row.largest_difference_m.map_or_else(dash, |x| fixed(1e6 * x, 2))),
+        ],
+    );
     let pictures = [
         "224 x 224 pixels",
         "preview (ms)",
@@ -441,5 +440,5 @@ fn document(r: &RenderBenchResult) -> Document {
                 rest.";
     Document::new("Render", "Cost of pictures")
         .with(Section::new("Previews", lead).table(Table::new(pictures, rows)).lines(lines))
-        .with(Section::new("Rays on one thread", "").table(Table::new(head, rays.collect())))
+        .with(Section::new("Rays on one thread", "").table(rays))
 }

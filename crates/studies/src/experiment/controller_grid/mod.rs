@@ -40,7 +40,6 @@ pub struct ControllerGridExperiment {
     pub threads: usize,
 }
 
-/// All configurations.
 fn grid() -> Vec<ControllerSettings> {
     let mut all = Vec::with_capacity(KINDS.len() * BANDWIDTHS.len() * DAMPINGS.len());
     for (law, correction) in KINDS {
@@ -131,8 +130,6 @@ impl Study for ControllerGridExperiment {
             trace: shown,
             plain_trace: plain,
             resumed,
-            seconds: job.seconds(),
-            report: job.report(),
         };
         let document = page::document(&result)?;
         Ok((result, document))
@@ -145,7 +142,6 @@ mod tests {
     use crate::trials::Resumed;
     use motion::{ControllerFigures, ControllerInstant};
 
-    /// A made-up result.
     fn made_up_result() -> ControllerGridResult {
         let row = |k: usize, s: &ControllerSettings| {
             let size = 1.0 + k as f64;
@@ -190,8 +186,6 @@ mod tests {
             plain_trace: (0..400).map(instant).collect(),
             rows,
             resumed: Resumed::default(),
-            seconds: 1.0,
-            report: String::new(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! The page of the controller grid.
 
-use super::motion::{ControllerFigures, ControllerInstant};
+use super::motion::ControllerInstant;
 use super::result::{ControllerGridResult, ControllerRow, MARGIN};
 use crate::Result;
 use crate::trials::resumed;
@@ -8,7 +8,7 @@ use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
-use trocar_report::table::{fixed, percent};
+use trocar_report::table::{fixed, percent, yes_or_no};
 use trocar_robot::manipulator::Law;
 
 /// Number of rows of the table.
@@ -198,78 +198,52 @@ fn errors(r: &ControllerGridResult) -> Result<String> {
 
 /// The chosen controller with the friction of the grid and with that of the arm.
 fn friction(r: &ControllerGridResult) -> Section {
-    let head = [
-        "Friction in each joint",
-        "RCM p95 (mm)",
-        "Tracking against the reference (mm)",
-        "Tracking against the command (mm)",
-        "Droop (mm)",
-        "Stable",
-    ];
-    let row = |name: &str, f: &ControllerFigures| {
-        vec![
-            name.to_owned(),
-            fixed(f.rcm_p95_mm, 4),
-            fixed(f.tracking_rms_mm, 4),
-            fixed(f.command_rms_mm, 3),
-            fixed(f.droop_mm, 4),
-            if f.stable { "yes" } else { "no" }.to_owned(),
-        ]
-    };
-    let grid = r.chosen.iter().map(|c| row("0.2 N m, as in the grid", &c.figures));
-    let own = r.chosen_with_own_friction.iter().map(|f| row("the FR3\u{2019}s own, 1.137 and 0.763 N m", f));
+    let chosen = r.chosen.iter().map(|c| ("0.2 N m, as in the grid", &c.figures));
+    let own = r.chosen_with_own_friction.iter().map(|f| ("the FR3\u{2019}s own, 1.137 and 0.763 N m", f));
+    let table = Table::of(
+        chosen.chain(own),
+        &[
+            ("Friction in each joint", &|(name, _)| (*name).to_owned()),
+            ("RCM p95 (mm)", &|(_, f)| fixed(f.rcm_p95_mm, 4)),
+            ("Tracking against the reference (mm)", &|(_, f)| fixed(f.tracking_rms_mm, 4)),
+            ("Tracking against the command (mm)", &|(_, f)| fixed(f.command_rms_mm, 3)),
+            ("Droop (mm)", &|(_, f)| fixed(f.droop_mm, 4)),
+            ("Stable", &|(_, f)| yes_or_no(f.stable)),
+        ],
+    );
     Section::new(
         "Friction",
         "The grid uses 0.2 N m in every joint instead of the FR3\u{2019}s own Coulomb friction, which its model \
          states as 1.137 N m for joints 1 to 4 and 0.763 N m for joints 5 to 7. The table shows the chosen \
          controller with both.",
     )
-    .table(Table::new(head, grid.chain(own).collect()))
+    .table(table)
 }
 
 fn best(r: &ControllerGridResult) -> Section {
     let mut sorted: Vec<&ControllerRow> = r.rows.iter().collect();
     sorted.sort_by(|a, b| a.share_of_targets().total_cmp(&b.share_of_targets()));
     let chosen = r.chosen.iter().map(|c| ("chosen", c));
-    let head = [
-        "",
-        "Controller",
-        "Bandwidth (rad/s)",
-        "Damping",
-        "Correction (rad/s)",
-        "RCM p95 (mm)",
-        "Tracking against the reference (mm)",
-        "Tracking against the command (mm)",
-        "Droop (mm)",
-        "Lag (ms)",
-        "RCM peak under impulses (mm)",
-        "Peak torque (N m)",
-        "Peak torque over limit",
-        "Worst figure over target",
-    ];
-    let rows: Vec<Vec<String>> = chosen
-        .chain(sorted.into_iter().take(BEST).map(|row| ("", row)))
-        .map(|(name, row)| {
-            let f = &row.figures;
-            vec![
-                name.to_owned(),
-                row.controller.clone(),
-                fixed(row.bandwidth, 0),
-                fixed(row.damping, 1),
-                row.observer.or(row.integral).map_or("\u{2013}".to_owned(), |v| fixed(v, 0)),
-                fixed(f.rcm_p95_mm, 4),
-                fixed(f.tracking_rms_mm, 4),
-                fixed(f.command_rms_mm, 3),
-                fixed(f.droop_mm, 4),
-                fixed(1e3 * f.lag_s, 2),
-                fixed(f.rough_rcm_mm.unwrap_or(f64::NAN), 2),
-                fixed(f.torque_peak, 1),
-                percent(f.torque_share, 0),
-                percent(row.share_of_targets(), 0),
-            ]
-        })
-        .collect();
+    let table = Table::of(
+        chosen.chain(sorted.into_iter().take(BEST).map(|row| ("", row))),
+        &[
+            ("", &|(name, _)| (*name).to_owned()),
+            ("Controller", &|(_, row)| row.controller.clone()),
+            ("Bandwidth (rad/s)", &|(_, row)| fixed(row.bandwidth, 0)),
+            ("Damping", &|(_, row)| fixed(row.damping, 1)),
+            ("Correction (rad/s)", &|(_, row)| fixed(row.observer.or(row.integral).unwrap_or(f64::NAN), 0)),
+            ("RCM p95 (mm)", &|(_, row)| fixed(row.figures.rcm_p95_mm, 4)),
+            ("Tracking against the reference (mm)", &|(_, row)| fixed(row.figures.tracking_rms_mm, 4)),
+            ("Tracking against the command (mm)", &|(_, row)| fixed(row.figures.command_rms_mm, 3)),
+            ("Droop (mm)", &|(_, row)| fixed(row.figures.droop_mm, 4)),
+            ("Lag (ms)", &|(_, row)| fixed(1e3 * row.figures.lag_s, 2)),
+            ("RCM peak under impulses (mm)", &|(_, row)| fixed(row.figures.rough_rcm_mm.unwrap_or(f64::NAN), 2)),
+            ("Peak torque (N m)", &|(_, row)| fixed(row.figures.torque_peak, 1)),
+            ("Peak torque over limit", &|(_, row)| percent(row.figures.torque_share, 0)),
+            ("Worst figure over target", &|(_, row)| percent(row.share_of_targets(), 0)),
+        ],
+    );
     Section::new("The chosen and the best ten", "Sorted by the worst figure over its target.")
-        .table(Table::new(head, rows))
+        .table(table)
         .lines(resumed(&r.resumed, "configurations"))
 }

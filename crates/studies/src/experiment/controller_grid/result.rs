@@ -77,8 +77,4 @@ pub struct ControllerGridResult {
     pub plain_trace: Vec<ControllerInstant>,
     /// Configurations of an earlier run.
     pub resumed: Resumed,
-    /// Wall time (s).
-    pub seconds: f64,
-    /// Path of the report.
-    pub report: String,
 }

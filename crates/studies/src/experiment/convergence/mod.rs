@@ -74,10 +74,6 @@ pub struct ConvergenceResult {
     pub nodes: usize,
     /// Cases of an earlier run that were used again.
     pub reused: usize,
-    /// Wall time of this run (s).
-    pub seconds: f64,
-    /// Path of the report.
-    pub report: String,
 }
 
 impl Study for ConvergenceExperiment {
@@ -115,8 +111,6 @@ impl Study for ConvergenceExperiment {
             tets: organs.tets(),
             nodes: organs.nodes(),
             reused: resumed.trials,
-            seconds: job.seconds(),
-            report: job.report(),
         };
         let document = document(&result)?;
         Ok((result, document))
@@ -131,7 +125,6 @@ impl ConvergenceExperiment {
         progress: &dyn Progress,
     ) -> Result<ConvergenceCase> {
         let made = Scene::named(scene, organs, material(young, poisson))
-            .map_err(Error::from)
             .and_then(|scene| step_ladder::measure(&scene, &SOLVERS, self.max_iterations, progress));
         let (rows, failure) = match made {
             Ok(rows) => (rows, None),
@@ -158,7 +151,6 @@ impl ConvergenceExperiment {
 /// The material drawn in full colour: Young's modulus (kPa), Poisson's ratio.
 const BASE: (f64, f64) = (12.0, 0.45);
 
-/// A description of a scene.
 fn described(scene: &str) -> &'static str {
     match scene {
         "sag" => "At rest under gravity, the lowest 42% of the nodes pinned: the exact step moves no node.",
@@ -245,41 +237,28 @@ fn failures(cases: &[&ConvergenceCase]) -> Vec<String> {
 
 /// All cases with the default iterations of the schedules.
 fn default_iterations(result: &ConvergenceResult) -> Section {
-    let head = [
-        "Scene",
-        "E (kPa)",
-        "nu",
-        "Schedule",
-        "Iterations",
-        "ms",
-        "RMS error (\u{b5}m)",
-        "over displacement",
-        "Energy",
-        "Inverted",
-    ];
     let scientific = |v: Option<f64>| v.map_or("\u{2013}".to_owned(), |v| format!("{v:.1e}"));
-    let mut rows = Vec::new();
-    for case in &result.cases {
-        for r in case.rows.iter().filter(|r| r.own) {
-            rows.push(vec![
-                case.scene.clone(),
-                case.young_kpa.to_string(),
-                case.poisson.to_string(),
-                r.schedule.clone(),
-                r.iterations.to_string(),
-                fixed(r.wall_ms, 3),
-                format!("{:.2e}", r.position_error_um),
-                scientific(Some(r.position_error)),
-                scientific(r.energy_error),
-                r.inverted.to_string(),
-            ]);
-        }
-    }
+    let rows = result.cases.iter().flat_map(|case| case.rows.iter().filter(|r| r.own).map(move |r| (case, r)));
+    let table = Table::of(
+        rows,
+        &[
+            ("Scene", &|(case, _)| case.scene.clone()),
+            ("E (kPa)", &|(case, _)| case.young_kpa.to_string()),
+            ("nu", &|(case, _)| case.poisson.to_string()),
+            ("Schedule", &|(_, r)| r.schedule.clone()),
+            ("Iterations", &|(_, r)| r.iterations.to_string()),
+            ("ms", &|(_, r)| fixed(r.wall_ms, 3)),
+            ("RMS error (\u{b5}m)", &|(_, r)| format!("{:.2e}", r.position_error_um)),
+            ("over displacement", &|(_, r)| scientific(Some(r.position_error))),
+            ("Energy", &|(_, r)| scientific(r.energy_error)),
+            ("Inverted", &|(_, r)| r.inverted.to_string()),
+        ],
+    );
     Section::new(
         "With the default iterations of each schedule",
         "One substep. <i>Over displacement</i>: over the RMS distance from the rest shape. <i>Energy</i>: the \
          incremental potential above the minimum, over that of the inertial predictor; single precision limits it to \
          about 1e-10. The plots show 12 kPa and nu 0.45 in full colour and the other materials pale.",
     )
-    .table(Table::new(head, rows))
+    .table(table)
 }

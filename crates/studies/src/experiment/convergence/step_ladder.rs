@@ -2,15 +2,14 @@
 //! minimum found by the oracle, and wall time.
 
 use crate::Result;
-use crate::scenes::{FRAME, OracleRun, Scene, grasps, rest_positions, tools};
-use crate::study::check_interrupted;
+use crate::scenes::{FRAME, OracleRun, Scene, grasps, reference, rest_positions, tools};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use trocar_core::Progress;
 use trocar_tissue::{Descent, QuasiNewton, SolverSettings, State, Stepper, ToolMotion};
 use trocar_tissue_reference::OracleState;
-use trocar_workflow::solver_named;
+use trocar_workflow::{check_interrupted, solver_named};
 
 /// Oracle steps per frame before the measured substep.
 const ORACLE_SUBSTEPS: usize = 4;
@@ -61,9 +60,6 @@ fn frames_before(scene: &str) -> Option<usize> {
 }
 
 /// Measures all rows of a scene.
-///
-/// # Errors
-/// An oracle that does not converge, an interruption.
 pub(super) fn measure(scene: &Scene, solvers: &[&str], max: usize, progress: &dyn Progress) -> Result<Vec<StepRow>> {
     let mut run = OracleRun::new(scene);
     let h = FRAME / ORACLE_SUBSTEPS as f64;
@@ -82,7 +78,7 @@ pub(super) fn measure(scene: &Scene, solvers: &[&str], max: usize, progress: &dy
             }
         }
     }
-    let mut start = run.state.to_state(&scene.model, &before, h)?;
+    let mut start = run.state.to_state(&scene.model, &before, h).map_err(reference)?;
     start.grasps = grasps(scene, &State::new(&scene.model));
     let mut rows = Vec::new();
     for name in solvers {
@@ -154,7 +150,7 @@ impl<'a> Ladder<'a> {
         let before = OracleState::from_state(&scene.model, start);
         let held = run.held_between_frames(time + h);
         let mut truth = before.clone();
-        run.oracle().step(&scene.model, &mut truth, h, &held)?;
+        run.oracle().step(&scene.model, &mut truth, h, &held).map_err(reference)?;
         let mut predictor = before.clone();
         for (b, body) in scene.model.bodies().iter().enumerate() {
             for i in (0..body.len()).filter(|i| !body.pinned()[*i]) {
@@ -163,7 +159,7 @@ impl<'a> Ladder<'a> {
         }
         held.iter().for_each(|n| predictor.positions_mut(n.body)[n.node as usize] = n.target);
         let total = |run: &mut OracleRun<'_>, state: &OracleState| -> Result<f64> {
-            Ok(run.oracle().energy(&scene.model, &before, state, h)?.iter().sum())
+            Ok(run.oracle().energy(&scene.model, &before, state, h).map_err(reference)?.iter().sum())
         };
         let energy = total(run, &truth)?;
         let predictor_excess = total(run, &predictor)? - energy;
@@ -205,7 +201,7 @@ impl<'a> Ladder<'a> {
         for (body, node) in &self.held {
             reached.positions_mut(*body)[*node] = self.truth.positions(*body)[*node];
         }
-        let energy: f64 = run.oracle().energy(model, &self.before, &reached, self.h)?.iter().sum();
+        let energy: f64 = run.oracle().energy(model, &self.before, &reached, self.h).map_err(reference)?.iter().sum();
         let excess = Some(energy - self.energy).filter(|e| e.is_finite());
         Ok(StepRow {
             schedule: name.to_owned(),

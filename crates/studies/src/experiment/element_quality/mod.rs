@@ -28,7 +28,6 @@ const MODULI: [f64; 5] = [3e3, 6e3, 12e3, 24e3, 48e3];
 /// Pin rules: name, and the share of the lowest nodes of the rest of the organ that is also pinned.
 const PINS: [(&str, f64); 2] = [("far-end", 0.0), ("far-end + band", 0.42)];
 
-/// Grasp designs.
 const DESIGNS: [GraspDesignName; 2] = [GraspDesignName::LivePose, GraspDesignName::Compliant];
 
 /// Organ coordinate of the grasp.
@@ -59,7 +58,6 @@ pub struct ElementQualityExperiment {
     pub threads: usize,
 }
 
-/// A case.
 struct Case<'a> {
     pins: &'static str,
     modulus: f64,
@@ -88,15 +86,7 @@ impl Study for ElementQualityExperiment {
         let settings = format!("{} N, {}", self.jaw_force, whole.fingerprint());
         let Outcomes { rows, resumed } = job.trials("cases", &settings, &cases, Case::key, self.threads, Case::run)?;
         let (nodes, tets) = whole.size();
-        let result = ElementQualityResult {
-            rows,
-            jaw_force_n: self.jaw_force,
-            nodes,
-            tets,
-            resumed,
-            seconds: job.seconds(),
-            report: job.report(),
-        };
+        let result = ElementQualityResult { rows, jaw_force_n: self.jaw_force, nodes, tets, resumed };
         let document = page::document(&result)?;
         Ok((result, document))
     }
@@ -169,7 +159,6 @@ mod tests {
     use crate::names::design_name;
     use crate::trials::Resumed;
 
-    /// A made-up result.
     fn made_up_result() -> ElementQualityResult {
         let mut rows = Vec::new();
         for (pins, _) in PINS {
@@ -200,15 +189,7 @@ mod tests {
                 }));
             }
         }
-        ElementQualityResult {
-            rows,
-            jaw_force_n: 1.0,
-            nodes: 1,
-            tets: 1,
-            resumed: Resumed::default(),
-            seconds: 1.0,
-            report: String::new(),
-        }
+        ElementQualityResult { rows, jaw_force_n: 1.0, nodes: 1, tets: 1, resumed: Resumed::default() }
     }
 
     #[test]

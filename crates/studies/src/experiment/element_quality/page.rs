@@ -8,7 +8,7 @@ use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
-use trocar_report::table::{count, fixed};
+use trocar_report::table::{count, fixed, or_dash, yes_or_no};
 
 pub(super) fn document(r: &ElementQualityResult) -> Result<Document> {
     // Groups of cases: condition, and whether the jaw force is proportional to the modulus.
@@ -96,47 +96,26 @@ fn volumes(rows: &[&ElementQualityRow], pins: &str) -> Result<String> {
 }
 
 fn table(rows: &[&ElementQualityRow]) -> Table {
-    let head = [
-        "Design",
-        "Condition",
-        "Pins",
-        "Lift (mm)",
-        "E (kPa)",
-        "Jaws (N)",
-        "Inverted",
-        "Diverged",
-        "Smallest volume",
-        "Yielded substeps",
-        "Follow ratio",
-        "Slip (mm)",
-        "Activation step (mm)",
-        "Pull (N)",
-        "Held",
-        "Suspensions",
-        "Remarks",
-    ];
-    let or_dash = |value: Option<f64>, decimals: usize| fixed(value.unwrap_or(f64::NAN), decimals);
-    let yes = |b: bool| if b { "yes" } else { "no" }.to_owned();
-    let row = |row: &&ElementQualityRow| {
-        vec![
-            row.design.clone(),
-            row.condition.name().to_owned(),
-            row.pins.clone(),
-            fixed(row.lift_mm, 0),
-            fixed(row.modulus_kpa, 0),
-            fixed(row.jaw_force_n, 2),
-            count(row.inverted_peak),
-            yes(row.diverged),
-            fixed(row.min_volume_ratio, 3),
-            count(row.yielded_substeps),
-            or_dash(row.follow_ratio, 3),
-            or_dash(row.slip_mm, 2),
-            or_dash(row.activation_step_mm, 2),
-            or_dash(row.peak_constraint_n, 2),
-            yes(row.held),
-            suspensions(row.suspensions),
-            remarks(row.divergence.as_ref(), row.why.as_ref(), (row.slipped, row.torn), None),
-        ]
-    };
-    Table::new(head, rows.iter().map(row).collect())
+    Table::of(
+        rows,
+        &[
+            ("Design", &|r| r.design.clone()),
+            ("Condition", &|r| r.condition.name().to_owned()),
+            ("Pins", &|r| r.pins.clone()),
+            ("Lift (mm)", &|r| fixed(r.lift_mm, 0)),
+            ("E (kPa)", &|r| fixed(r.modulus_kpa, 0)),
+            ("Jaws (N)", &|r| fixed(r.jaw_force_n, 2)),
+            ("Inverted", &|r| count(r.inverted_peak)),
+            ("Diverged", &|r| yes_or_no(r.diverged)),
+            ("Smallest volume", &|r| fixed(r.min_volume_ratio, 3)),
+            ("Yielded substeps", &|r| count(r.yielded_substeps)),
+            ("Follow ratio", &|r| or_dash(r.follow_ratio, 3)),
+            ("Slip (mm)", &|r| or_dash(r.slip_mm, 2)),
+            ("Activation step (mm)", &|r| or_dash(r.activation_step_mm, 2)),
+            ("Pull (N)", &|r| or_dash(r.peak_constraint_n, 2)),
+            ("Held", &|r| yes_or_no(r.held)),
+            ("Suspensions", &|r| suspensions(r.suspensions)),
+            ("Remarks", &|r| remarks(r.divergence.as_ref(), r.why.as_ref(), (r.slipped, r.torn), None)),
+        ],
+    )
 }

@@ -66,8 +66,4 @@ pub struct ElementQualityResult {
     pub tets: usize,
     /// Cases of an earlier run.
     pub resumed: Resumed,
-    /// Wall time (s).
-    pub seconds: f64,
-    /// Path of the page.
-    pub report: String,
 }

@@ -10,14 +10,14 @@ use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
-use trocar_report::table::{count, fixed};
+use trocar_report::table::{count, fixed, or_dash, yes_or_no};
 
 pub(super) fn document(r: &GraspDesignsResult) -> Result<Document> {
     let mut document = Document::new("Grasp designs", "Four ways to hold the appendix");
     for condition in conditions(r) {
         let figures = [
             lift_over_time(r, condition)?,
-            by_place(r, condition, "lift (mm)", &|t| t.lift_mm)?,
+            by_place(r, condition, "lift (mm)", &|t| Some(t.lift_mm))?,
             by_place(r, condition, "slip (mm)", &|t| t.slip_mm)?,
             snaps(r, condition)?,
         ];
@@ -102,9 +102,12 @@ fn table_ii(r: &GraspDesignsResult, condition: Condition) -> Table {
             format!("{} of {}", row.held, row.trials),
             count(row.diverged),
             fixed(row.lift_median_mm, 1),
-            fixed(row.slip_median_mm, 2),
+            or_dash(row.slip_median_mm, 2),
             range(row.snap_least_mm.zip(row.snap_mm)),
-            format!("{} (max. {})", fixed(row.activation_step_median_mm, 2), fixed(row.activation_step_most_mm, 2)),
+            row.activation_step_median_mm.zip(row.activation_step_most_mm).map_or_else(
+                || or_dash(None, 2),
+                |(median, most)| format!("{} (max. {})", fixed(median, 2), fixed(most, 2)),
+            ),
             count(row.inverted_peak),
             fixed(row.min_volume_ratio, 2),
             suspensions(row.suspensions),
@@ -129,7 +132,6 @@ fn table_ii(r: &GraspDesignsResult, condition: Condition) -> Table {
     Table::new(head, rows.flat_map(|row| std::iter::once(measured(row)).chain(paper(row))).collect())
 }
 
-/// First grasps of one design.
 fn first_grasps<'a>(
     r: &'a GraspDesignsResult,
     condition: Condition,
@@ -160,14 +162,15 @@ fn by_place(
     r: &GraspDesignsResult,
     condition: Condition,
     y: &str,
-    value: &dyn Fn(&GraspTrial) -> f64,
+    value: &dyn Fn(&GraspTrial) -> Option<f64>,
 ) -> Result<String> {
     let points = |design: &str| {
         let mut places: Vec<(f64, f64, f64)> = Vec::new();
         for t in first_grasps(r, condition, design).filter(|t| t.divergence.is_none()) {
+            let Some(value) = value(t) else { continue };
             match places.iter_mut().find(|p| p.0 == t.asked) {
-                Some(place) => (place.1, place.2) = (place.1 + value(t), place.2 + 1.0),
-                None => places.push((t.asked, value(t), 1.0)),
+                Some(place) => (place.1, place.2) = (place.1 + value, place.2 + 1.0),
+                None => places.push((t.asked, value, 1.0)),
             }
         }
         places.iter().map(|p| (p.0, p.1 / p.2)).collect()
@@ -180,7 +183,7 @@ fn snaps(r: &GraspDesignsResult, condition: Condition) -> Result<String> {
     let points = |design: &str| {
         let is = |t: &&GraspTrial| t.condition == condition && t.design == design && t.drag_mm.is_some();
         let second = r.trials.iter().filter(is);
-        let mut points: Vec<(f64, f64)> = second.filter_map(|t| Some((t.displaced_mm, t.snap_mean_mm?))).collect();
+        let mut points: Vec<(f64, f64)> = second.filter_map(|t| Some((t.displaced_mm?, t.snap_mean_mm?))).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         points
     };
@@ -190,48 +193,30 @@ fn snaps(r: &GraspDesignsResult, condition: Condition) -> Result<String> {
 }
 
 fn trials(r: &GraspDesignsResult) -> Section {
-    let head = [
-        "Condition",
-        "Design",
-        "s",
-        "Offset (mm)",
-        "Drag (mm)",
-        "Held",
-        "Lift (mm)",
-        "Slip (mm)",
-        "Snap (mm)",
-        "Activation step (mm)",
-        "Closing force (N)",
-        "Gap (mm)",
-        "Pull (N)",
-        "Yielded",
-        "Smallest volume",
-        "Suspensions",
-        "Remarks",
-    ];
-    let row = |t: &GraspTrial| {
-        let inverted = (t.inverted_peak > 0).then(|| format!("{} inverted", t.inverted_peak));
-        vec![
-            t.condition.name().to_owned(),
-            t.design.clone(),
-            fixed(t.at, 2),
-            fixed(t.offset_mm, 0),
-            t.drag_mm.map_or(String::new(), |d| fixed(d, 0)),
-            if t.held { "yes" } else { "no" }.to_owned(),
-            fixed(t.lift_mm, 1),
-            fixed(t.slip_mm, 2),
-            t.snap_mm.map_or(String::new(), |s| fixed(s, 2)),
-            fixed(t.activation_step_mm, 2),
-            fixed(t.closing_force_n, 2),
-            fixed(t.gap_mm, 1),
-            fixed(t.peak_constraint_n, 2),
-            count(t.yielded_substeps),
-            fixed(t.min_volume_ratio, 2),
-            suspensions(t.suspensions),
-            remarks(t.divergence.as_ref(), t.why.as_ref(), (t.slipped, t.torn), inverted),
-        ]
-    };
-    Section::new("All trials", "").table(Table::new(head, r.trials.iter().map(row).collect()).on_page_only())
+    let inverted = |t: &GraspTrial| (t.inverted_peak > 0).then(|| format!("{} inverted", t.inverted_peak));
+    let table = Table::of(
+        &r.trials,
+        &[
+            ("Condition", &|t| t.condition.name().to_owned()),
+            ("Design", &|t| t.design.clone()),
+            ("s", &|t| fixed(t.at, 2)),
+            ("Offset (mm)", &|t| fixed(t.offset_mm, 0)),
+            ("Drag (mm)", &|t| t.drag_mm.map_or(String::new(), |d| fixed(d, 0))),
+            ("Held", &|t| yes_or_no(t.held)),
+            ("Lift (mm)", &|t| fixed(t.lift_mm, 1)),
+            ("Slip (mm)", &|t| or_dash(t.slip_mm, 2)),
+            ("Snap (mm)", &|t| t.snap_mm.map_or(String::new(), |s| fixed(s, 2))),
+            ("Activation step (mm)", &|t| or_dash(t.activation_step_mm, 2)),
+            ("Closing force (N)", &|t| or_dash(t.closing_force_n, 2)),
+            ("Gap (mm)", &|t| or_dash(t.gap_mm, 1)),
+            ("Pull (N)", &|t| fixed(t.peak_constraint_n, 2)),
+            ("Yielded", &|t| count(t.yielded_substeps)),
+            ("Smallest volume", &|t| fixed(t.min_volume_ratio, 2)),
+            ("Suspensions", &|t| suspensions(t.suspensions)),
+            ("Remarks", &|t| remarks(t.divergence.as_ref(), t.why.as_ref(), (t.slipped, t.torn), inverted(t))),
+        ],
+    );
+    Section::new("All trials", "").table(table.on_page_only())
 }
 
 #[cfg(test)]

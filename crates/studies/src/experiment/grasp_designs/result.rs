@@ -75,21 +75,21 @@ pub struct GraspTrial {
     pub divergence: Option<String>,
     /// Why it did not pass.
     pub why: Option<String>,
-    /// Lift (mm).
+    /// Lift (mm); 0 without a grasp.
     pub lift_mm: f64,
-    /// Tissue lift over jaw lift.
-    pub follow_ratio: f64,
+    /// Tissue lift over jaw lift; none without a grasp, as are the next figures.
+    pub follow_ratio: Option<f64>,
     /// Slip (mm).
-    pub slip_mm: f64,
+    pub slip_mm: Option<f64>,
     /// Largest snap of a node (mm); none for friction. Zero by construction for designs that
     /// capture nodes where they are.
     pub snap_mm: Option<f64>,
     /// Mean snap over the nodes (mm).
     pub snap_mean_mm: Option<f64>,
     /// Largest motion of a node in the first frame of the grasp (mm).
-    pub activation_step_mm: f64,
+    pub activation_step_mm: Option<f64>,
     /// Mean displacement of the nodes from rest when the jaws closed (mm).
-    pub displaced_mm: f64,
+    pub displaced_mm: Option<f64>,
     /// Largest number of inverted elements in any frame.
     pub inverted_peak: usize,
     /// Smallest volume of an element over its volume at rest.
@@ -97,9 +97,9 @@ pub struct GraspTrial {
     /// Substeps in which the grasp yielded.
     pub yielded_substeps: usize,
     /// Force of the tissue on the closed blades (N).
-    pub closing_force_n: f64,
+    pub closing_force_n: Option<f64>,
     /// Gap between the closed blades (mm).
-    pub gap_mm: f64,
+    pub gap_mm: Option<f64>,
     /// Largest force of held nodes on the gripper (N).
     pub peak_constraint_n: f64,
     /// How often held tissue slipped.
@@ -127,20 +127,20 @@ pub struct GraspDesignRow {
     pub diverged: usize,
     /// Median lift of the other trials (mm). The paper's figure is also a median.
     pub lift_median_mm: f64,
-    /// Median slip of these trials (mm).
-    pub slip_median_mm: f64,
+    /// Median slip of those with a grasp (mm); none without any, as are the next figures.
+    pub slip_median_mm: Option<f64>,
     /// Largest slip (mm).
-    pub slip_most_mm: f64,
+    pub slip_most_mm: Option<f64>,
     /// Largest snap of a trial (mm); none for friction.
     pub snap_mm: Option<f64>,
     /// Smallest snap of a trial (mm).
     pub snap_least_mm: Option<f64>,
     /// Median of the activation steps (mm).
-    pub activation_step_median_mm: f64,
+    pub activation_step_median_mm: Option<f64>,
     /// Largest activation step (mm).
-    pub activation_step_most_mm: f64,
+    pub activation_step_most_mm: Option<f64>,
     /// Median follow ratio.
-    pub follow_ratio_median: f64,
+    pub follow_ratio_median: Option<f64>,
     /// Largest number of inverted elements in any frame of any trial.
     pub inverted_peak: usize,
     /// Smallest volume of an element over its volume at rest in any trial.
@@ -172,10 +172,6 @@ pub struct GraspDesignsResult {
     pub tets: usize,
     /// Trials of an earlier run.
     pub resumed: Resumed,
-    /// Wall time (s).
-    pub seconds: f64,
-    /// Path of the page.
-    pub report: String,
 }
 
 /// One row per design; those of the second grasp are last.
@@ -190,9 +186,13 @@ fn row(condition: Condition, design: GraspDesignName, regrasp: bool, trials: &[G
     let is = |t: &&GraspTrial| t.condition == condition && t.design == name && t.drag_mm.is_some() == regrasp;
     let of: Vec<&GraspTrial> = trials.iter().filter(is).collect();
     let ended: Vec<&&GraspTrial> = of.iter().filter(|t| t.divergence.is_none()).collect();
-    let values = |value: &dyn Fn(&GraspTrial) -> f64| -> Vec<f64> { ended.iter().map(|t| value(t)).collect() };
-    let median = |value: &dyn Fn(&GraspTrial) -> f64| median(&mut values(value));
-    let most = |value: &dyn Fn(&GraspTrial) -> f64| values(value).into_iter().fold(0.0, f64::max);
+    let values =
+        |value: &dyn Fn(&GraspTrial) -> Option<f64>| -> Vec<f64> { ended.iter().filter_map(|t| value(t)).collect() };
+    let median_of = |value: &dyn Fn(&GraspTrial) -> Option<f64>| {
+        let mut values = values(value);
+        (!values.is_empty()).then(|| median(&mut values))
+    };
+    let most = |value: &dyn Fn(&GraspTrial) -> Option<f64>| values(value).into_iter().reduce(f64::max);
     let snaps = || of.iter().filter_map(|t| t.snap_mm);
     let sum = |k: usize| of.iter().map(|t| t.suspensions[k]).sum();
     (!of.is_empty()).then(|| GraspDesignRow {
@@ -201,14 +201,14 @@ fn row(condition: Condition, design: GraspDesignName, regrasp: bool, trials: &[G
         held: of.iter().filter(|t| t.held).count(),
         trials: of.len(),
         diverged: of.len() - ended.len(),
-        lift_median_mm: median(&|t| t.lift_mm),
-        slip_median_mm: median(&|t| t.slip_mm),
+        lift_median_mm: median(&mut values(&|t| Some(t.lift_mm))),
+        slip_median_mm: median_of(&|t| t.slip_mm),
         slip_most_mm: most(&|t| t.slip_mm),
         snap_mm: snaps().reduce(f64::max),
         snap_least_mm: snaps().reduce(f64::min),
-        activation_step_median_mm: median(&|t| t.activation_step_mm),
+        activation_step_median_mm: median_of(&|t| t.activation_step_mm),
         activation_step_most_mm: most(&|t| t.activation_step_mm),
-        follow_ratio_median: median(&|t| t.follow_ratio),
+        follow_ratio_median: median_of(&|t| t.follow_ratio),
         inverted_peak: of.iter().map(|t| t.inverted_peak).max().unwrap_or(0),
         min_volume_ratio: of.iter().map(|t| t.min_volume_ratio).fold(1.0, f64::min),
         suspensions: [sum(0), sum(1), sum(2)],
@@ -236,17 +236,17 @@ pub(crate) mod tests {
             divergence: (k == 1).then(|| "<b>made up</b>".to_owned()),
             why: None,
             lift_mm: 15.0 - value,
-            follow_ratio: 1.0,
-            slip_mm: 0.1 * value,
+            follow_ratio: Some(1.0),
+            slip_mm: Some(0.1 * value),
             snap_mm: ties.then_some(value),
             snap_mean_mm: ties.then_some(0.5 * value),
-            activation_step_mm: 0.01 * value,
-            displaced_mm: 0.6 * value,
+            activation_step_mm: Some(0.01 * value),
+            displaced_mm: Some(0.6 * value),
             inverted_peak: k,
             min_volume_ratio: 0.5,
             yielded_substeps: 0,
-            closing_force_n: 1.0,
-            gap_mm: 4.0,
+            closing_force_n: Some(1.0),
+            gap_mm: Some(4.0),
             peak_constraint_n: 0.2,
             slipped: 0,
             torn: false,
@@ -274,8 +274,6 @@ pub(crate) mod tests {
             nodes: 1,
             tets: 1,
             resumed: Resumed::default(),
-            seconds: 1.0,
-            report: String::new(),
         }
     }
 

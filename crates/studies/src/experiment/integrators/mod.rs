@@ -5,8 +5,8 @@ mod forms;
 mod row;
 
 use crate::names::Recorded;
-use crate::scenes::{FRAME, Organs, Scene, material, mean_error, rest_positions};
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::scenes::{FRAME, Organs, Scene, material, mean_error, reference, rest_positions};
+use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
 use forms::{Form, findings, forms};
@@ -24,7 +24,7 @@ use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
 use trocar_tissue::{Model, SolverSettings, State};
 use trocar_tissue_reference::{Oracle, OracleState, stable_explicit_step};
-use trocar_workflow::phantoms;
+use trocar_workflow::{check_interrupted, phantoms};
 
 /// Node speed that counts as divergence (m/s): the limit of the paper.
 const SPEED_LIMIT: f64 = 20.0;
@@ -83,10 +83,6 @@ pub struct IntegratorsResult {
     pub undamped: bool,
     /// Worker threads.
     pub threads: usize,
-    /// Wall time (s).
-    pub seconds: f64,
-    /// Path of the report.
-    pub report: String,
 }
 
 impl Study for IntegratorsExperiment {
@@ -126,8 +122,6 @@ impl Study for IntegratorsExperiment {
             sag_mm: 1e3 * truth.sag,
             undamped: self.undamped,
             threads: if self.threads == 0 { rayon::current_num_threads() } else { self.threads },
-            seconds: job.seconds(),
-            report: job.report(),
         };
         let document = document(&result)?;
         Ok((result, document))
@@ -164,7 +158,7 @@ struct Equilibrium {
 impl Equilibrium {
     fn of(model: &Model) -> Result<Self> {
         let mut state = OracleState::new(model);
-        Oracle::new(model).settle(model, &mut state, &[])?;
+        Oracle::new(model).settle(model, &mut state, &[]).map_err(reference)?;
         let rest = rest_positions(model);
         let positions: Vec<DVec3> =
             (0..model.bodies().len()).flat_map(|b| state.positions(b).iter().copied()).collect();
@@ -181,7 +175,7 @@ fn measured(
     threads: usize,
     progress: &dyn Progress,
 ) -> Result<IntegratorRow> {
-    let mut stepper = form.scheme.stepper(model, FRAME, threads)?;
+    let mut stepper = form.scheme.stepper(model, FRAME, threads).map_err(reference)?;
     let mut state = State::new(model);
     let mut mean = vec![DVec3::ZERO; truth.rest.len()];
     let first_measured = frames - ((AVERAGED_SHARE * frames as f64) as usize).max(1);
@@ -287,40 +281,30 @@ fn cards(result: &IntegratorsResult) -> [Card; 4] {
 }
 
 fn rows(result: &IntegratorsResult) -> Section {
-    let head = [
-        "Integrator",
-        "Settings",
-        "Paper",
-        "Outcome",
-        "Peak (m/s)",
-        "Last (m/s)",
-        "Sag over equilibrium",
-        "Sag error",
-        "Frame (ms)",
-    ];
-    let or_dash = |v: Option<String>| v.unwrap_or_else(|| "\u{2013}".to_owned());
-    let row = |r: &IntegratorRow| {
-        let outcome = match (&r.event, r.ended_at_s) {
-            (Some(event), Some(at)) => format!("{event}, after {} s", fixed(at, 3)),
-            _ => "bounded".to_owned(),
-        };
-        vec![
-            r.name.to_owned(),
-            r.settings.clone(),
-            r.paper.to_owned(),
-            outcome,
-            format!("{:.1e}", r.peak_speed_m_s),
-            format!("{:.1e}", r.last_speed_m_s),
-            or_dash(r.sag_ratio.map(|s| fixed(s, 2))),
-            or_dash(r.sag_error.map(|e| percent(e, 2))),
-            fixed(r.frame_ms, 1),
-        ]
+    let outcome = |r: &IntegratorRow| match (&r.event, r.ended_at_s) {
+        (Some(event), Some(at)) => format!("{event}, after {} s", fixed(at, 3)),
+        _ => "bounded".to_owned(),
     };
+    let or_dash = |v: Option<String>| v.unwrap_or_else(|| "\u{2013}".to_owned());
+    let table = Table::of(
+        &result.integrators,
+        &[
+            ("Integrator", &|r| r.name.to_owned()),
+            ("Settings", &|r| r.settings.clone()),
+            ("Paper", &|r| r.paper.to_owned()),
+            ("Outcome", &|r| outcome(r)),
+            ("Peak (m/s)", &|r| format!("{:.1e}", r.peak_speed_m_s)),
+            ("Last (m/s)", &|r| format!("{:.1e}", r.last_speed_m_s)),
+            ("Sag over equilibrium", &|r| or_dash(r.sag_ratio.map(|s| fixed(s, 2)))),
+            ("Sag error", &|r| or_dash(r.sag_error.map(|e| percent(e, 2)))),
+            ("Frame (ms)", &|r| fixed(r.frame_ms, 1)),
+        ],
+    );
     let lead = format!(
         "<i>Sag error</i>: mean distance of the nodes from the static equilibrium (Newton\u{2019}s method in double \
          precision) over their mean displacement in it, positions averaged over the last third of the run. Frames on \
          {} threads.",
         result.threads
     );
-    Section::new("All integrators", lead).table(Table::new(head, result.integrators.iter().map(row).collect()))
+    Section::new("All integrators", lead).table(table)
 }

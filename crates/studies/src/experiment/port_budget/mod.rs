@@ -7,12 +7,13 @@ mod result;
 
 use crate::Result;
 use crate::names::millimetres;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use clap::Args;
 use pushing::{DIRECTIONS, Pushing};
 use result::{PortBudgetResult, PortRoom, PortStart};
 use trocar_core::Progress;
 use trocar_report::document::Document;
+use trocar_workflow::check_interrupted;
 
 /// Largest tilt of the table (degrees).
 const MAX_TILT: f64 = 35.0;
@@ -54,8 +55,7 @@ impl Study for PortBudgetExperiment {
     fn run(&self, job: &Job<'_>) -> Result<(PortBudgetResult, Document)> {
         let pushing = self.pushing()?;
         job.claim()?;
-        let measured = self.measure(&pushing, job.progress)?;
-        let result = PortBudgetResult { report: job.report(), seconds: job.seconds(), ..measured };
+        let result = self.measure(&pushing, job.progress)?;
         let document = page::document(&result)?;
         Ok((result, document))
     }
@@ -108,8 +108,6 @@ impl PortBudgetExperiment {
             limit_deg: port.tilt_with_clearance(radius, 0.0).map(f64::to_degrees),
             measured_limit_deg: pushing.limit().map(f64::to_degrees),
             paper_limit_deg: PAPER_LIMIT,
-            seconds: 0.0,
-            report: String::new(),
         })
     }
 }

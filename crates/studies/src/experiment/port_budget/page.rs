@@ -7,7 +7,7 @@ use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
-use trocar_report::table::fixed;
+use trocar_report::table::{fixed, or_dash};
 
 /// The tables show every fifth row; the JSON has all.
 const EVERY: usize = 5;
@@ -172,49 +172,33 @@ fn loaded(r: &PortBudgetResult) -> Result<String> {
 }
 
 fn starts(r: &PortBudgetResult) -> Section {
-    let head = ["Start pose", "Tilt (\u{b0})", "Paper (mm)", "Formula (mm)", "Measured (mm)"];
-    let number = |v: Option<f64>| fixed(v.unwrap_or(f64::NAN), 4);
-    let rows: Vec<Vec<String>> = r
-        .starts
-        .iter()
-        .map(|s| {
-            let numbers = [fixed(s.tilt_deg, 1), fixed(s.paper_mm, 2), fixed(s.clearance_mm, 4), number(s.measured_mm)];
-            [s.arm.to_owned()].into_iter().chain(numbers).collect()
-        })
-        .collect();
-    Section::new("Beside the paper", "").table(Table::new(head, rows))
+    let table = Table::of(
+        &r.starts,
+        &[
+            ("Start pose", &|s| s.arm.to_owned()),
+            ("Tilt (\u{b0})", &|s| fixed(s.tilt_deg, 1)),
+            ("Paper (mm)", &|s| fixed(s.paper_mm, 2)),
+            ("Formula (mm)", &|s| fixed(s.clearance_mm, 4)),
+            ("Measured (mm)", &|s| or_dash(s.measured_mm, 4)),
+        ],
+    );
+    Section::new("Beside the paper", "").table(table)
 }
 
 fn rows(r: &PortBudgetResult) -> Section {
-    let head = [
-        "Tilt (\u{b0})",
-        "Formula (mm)",
-        "Measured, along the tilt (mm)",
-        "opposite (mm)",
-        "across (mm)",
-        "Smallest in any direction (mm)",
-        "Pushed (mm)",
-        "1 mm sheet (mm)",
-        "2 mm sheet (mm)",
-    ];
-    let number = |v: Option<f64>| fixed(v.unwrap_or(f64::NAN), 4);
-    let rows: Vec<Vec<String>> = r
-        .rows
-        .iter()
-        .step_by(EVERY)
-        .map(|row| {
-            vec![
-                fixed(row.tilt_deg, 1),
-                fixed(row.clearance_mm, 4),
-                number(row.measured_mm),
-                number(row.measured_against_mm),
-                number(row.measured_across_mm),
-                number(row.measured_least_mm),
-                fixed(row.pushed_mm, 4),
-                fixed(row.thicker_mm[0], 4),
-                fixed(row.thicker_mm[1], 4),
-            ]
-        })
-        .collect();
-    Section::new("Over tilt", "A dash: the centred shaft touches.").table(Table::new(head, rows).on_page_only())
+    let table = Table::of(
+        r.rows.iter().step_by(EVERY),
+        &[
+            ("Tilt (\u{b0})", &|row| fixed(row.tilt_deg, 1)),
+            ("Formula (mm)", &|row| fixed(row.clearance_mm, 4)),
+            ("Measured, along the tilt (mm)", &|row| or_dash(row.measured_mm, 4)),
+            ("opposite (mm)", &|row| or_dash(row.measured_against_mm, 4)),
+            ("across (mm)", &|row| or_dash(row.measured_across_mm, 4)),
+            ("Smallest in any direction (mm)", &|row| or_dash(row.measured_least_mm, 4)),
+            ("Pushed (mm)", &|row| fixed(row.pushed_mm, 4)),
+            ("1 mm sheet (mm)", &|row| fixed(row.thicker_mm[0], 4)),
+            ("2 mm sheet (mm)", &|row| fixed(row.thicker_mm[1], 4)),
+        ],
+    );
+    Section::new("Over tilt", "A dash: the centred shaft touches.").table(table.on_page_only())
 }

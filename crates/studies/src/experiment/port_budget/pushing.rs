@@ -25,9 +25,6 @@ pub(super) struct Pushing {
 impl Pushing {
     /// A port with a hole of diameter `hole` (m) in a sheet of `thickness` (m), and a shaft of
     /// diameter `shaft` (m).
-    ///
-    /// # Errors
-    /// Dimensions out of range; a shaft that is not thinner than the hole.
     pub fn new(hole: f64, shaft: f64, thickness: f64) -> Result<Self> {
         let port = Port { hole_diameter: hole, thickness, ..Port::new(DVec3::ZERO, DVec3::Z, DVec3::X)? };
         port.check()?;

@@ -78,8 +78,4 @@ pub struct PortBudgetResult {
     pub paper_limit_deg: f64,
     /// Largest difference between formula and contact model in the direction of the tilt (mm).
     pub largest_difference_mm: f64,
-    /// Wall time (s).
-    pub seconds: f64,
-    /// Path of the report.
-    pub report: String,
 }

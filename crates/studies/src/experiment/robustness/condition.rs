@@ -34,7 +34,6 @@ impl Condition {
         format!("{} {}{number} from {} times {}", self.factor, self.value, self.seeds[0], self.seeds.len())
     }
 
-    /// The specimens of its episodes.
     pub fn specimens(&self) -> Vec<SpecimenSource> {
         let mut all: Vec<SpecimenSource> = self.seeds.iter().map(|seed| self.scene.draw(*seed).specimen).collect();
         all.sort_by_key(SpecimenSource::label);
@@ -44,10 +43,6 @@ impl Condition {
 }
 
 /// The conditions: the scene as it is written, each factor at each of its values, and all together.
-///
-/// # Errors
-/// A name that is unknown or of something that the set does not vary; a value that does not suit
-/// the scene.
 pub(super) fn conditions(scene: &Scene, own: &RobustnessExperiment) -> Result<Vec<Condition>> {
     let mut varied = scene.clone();
     varied.variation.set = own.variation;

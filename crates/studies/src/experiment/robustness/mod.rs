@@ -116,7 +116,15 @@ impl Study for RobustnessExperiment {
             job.trials("conditions", &settings, &all, Condition::key, own.threads, |condition, progress| {
                 row(condition, &specimens, progress)
             })?;
-        let result = RobustnessResult::of(&scene, &own, rows, resumed, job);
+        let result = RobustnessResult {
+            scene: scene.name,
+            variation: own.variation.name(),
+            episodes: own.episodes,
+            together: own.together,
+            seed: own.seed,
+            rows,
+            resumed,
+        };
         let document = page::document(&result)?;
         Ok((result, document))
     }

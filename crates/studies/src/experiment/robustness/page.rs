@@ -6,7 +6,7 @@ use crate::trials::resumed;
 use trocar_campaign::{Curve, success_by_name, success_over};
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
-use trocar_report::table::count;
+use trocar_report::table::{count, fixed};
 
 pub(super) fn document(r: &RobustnessResult) -> Result<Document> {
     let subtitle = "Success of six controllers over each factor of variation";
@@ -86,32 +86,20 @@ fn one_at_a_time(r: &RobustnessResult) -> Section {
 }
 
 fn all(r: &RobustnessResult) -> Section {
-    let head = [
-        "factor",
-        "value",
-        "controller",
-        "passed",
-        "mean score",
-        "could not begin",
-        "diverged",
-        "inverted",
-        "suspensions",
-        "why the first did not pass",
-    ];
-    let line = |row: &RobustnessRow, p: &PolicyOutcome| {
-        vec![
-            row.label.clone(),
-            row.value.clone(),
-            p.policy.clone(),
-            format!("{} of {}", p.passed, p.episodes),
-            trocar_report::table::fixed(p.mean_score, 2),
-            count(p.refused),
-            count(p.diverged),
-            count(p.inverted_peak),
-            p.suspensions.map(|n| n.to_string()).join("/"),
-            p.why.clone().unwrap_or_default(),
-        ]
-    };
-    let rows = r.rows.iter().flat_map(|row| row.policies.iter().map(|p| line(row, p))).collect();
-    Section::new("All conditions", "").table(Table::new(head, rows).on_page_only())
+    let table = Table::of(
+        r.rows.iter().flat_map(|row| row.policies.iter().map(move |p| (row, p))),
+        &[
+            ("factor", &|(row, _)| row.label.clone()),
+            ("value", &|(row, _)| row.value.clone()),
+            ("controller", &|(_, p)| p.policy.clone()),
+            ("passed", &|(_, p)| format!("{} of {}", p.passed, p.episodes)),
+            ("mean score", &|(_, p)| fixed(p.mean_score, 2)),
+            ("could not begin", &|(_, p)| count(p.refused)),
+            ("diverged", &|(_, p)| count(p.diverged)),
+            ("inverted", &|(_, p)| count(p.inverted_peak)),
+            ("suspensions", &|(_, p)| p.suspensions.map(|n| n.to_string()).join("/")),
+            ("why the first did not pass", &|(_, p)| p.why.clone().unwrap_or_default()),
+        ],
+    );
+    Section::new("All conditions", "").table(table.on_page_only())
 }

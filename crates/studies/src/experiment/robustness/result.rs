@@ -1,12 +1,9 @@
 //! The figures of the study.
 
-use super::RobustnessExperiment;
 use super::condition::{AS_WRITTEN, TOGETHER};
-use crate::study::Job;
 use crate::trials::Resumed;
 use serde::{Deserialize, Serialize};
 use trocar_campaign::{Bin, Curve, Interval, Share};
-use trocar_scene::Scene;
 use trocar_task::Summary;
 
 /// The episodes of a controller at a condition.
@@ -93,33 +90,9 @@ pub struct RobustnessResult {
     pub rows: Vec<RobustnessRow>,
     /// Conditions of an earlier run.
     pub resumed: Resumed,
-    /// Wall time (s).
-    pub seconds: f64,
-    /// Path of the page.
-    pub report: String,
 }
 
 impl RobustnessResult {
-    pub(super) fn of(
-        scene: &Scene,
-        own: &RobustnessExperiment,
-        rows: Vec<RobustnessRow>,
-        resumed: Resumed,
-        job: &Job<'_>,
-    ) -> Self {
-        Self {
-            scene: scene.name.clone(),
-            variation: own.variation.name(),
-            episodes: own.episodes,
-            together: own.together,
-            seed: own.seed,
-            rows,
-            resumed,
-            seconds: job.seconds(),
-            report: job.report(),
-        }
-    }
-
     /// The scene as it is written.
     pub(super) fn as_written(&self) -> Option<&RobustnessRow> {
         self.rows.iter().find(|row| row.factor == AS_WRITTEN)

@@ -17,7 +17,7 @@ pub use result::SimilarityResult;
 
 use crate::Result;
 use crate::names::{Recorded, phantoms_or_all};
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use clap::Args;
 use measure::{Sides, SimilarityPictures, first_frames, labelled, measure};
 use result::PAPER;
@@ -28,7 +28,7 @@ use trocar_core::Progress;
 use trocar_reconstruct::{Reconstruction, Settings};
 use trocar_report::document::Document;
 use trocar_workflow::phantoms::recorded;
-use trocar_workflow::reconstruct_recording;
+use trocar_workflow::{check_interrupted, reconstruct_recording};
 
 /// Silhouettes, SSIM and PSNR of rendered reconstructions against the recordings, and oblique views
 /// through the endoscope.
@@ -95,8 +95,7 @@ impl Study for SimilarityExperiment {
         }
         let (rows, shown): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
         let (oblique, seen_obliquely): (Vec<_>, Vec<_>) = oblique.into_iter().unzip();
-        let result =
-            SimilarityResult { rows, oblique, skipped, paper: PAPER, seconds: job.seconds(), report: job.report() };
+        let result = SimilarityResult { rows, oblique, skipped, paper: PAPER };
         let document = page::document(&result, &shown, &seen_obliquely)?;
         Ok((result, document))
     }
@@ -133,7 +132,7 @@ impl SimilarityExperiment {
             rendered: &rendered,
             covered: &first.instruments,
             second: second.as_ref().map(|s| (&s.color, &s.instruments)),
-            composite: Some(&made.background),
+            composite: Some(&made.composite.color),
         })?;
         rendered.write_png(&folder.join("rendered.png"))?;
         first.color.write_png(&folder.join("real.png"))?;

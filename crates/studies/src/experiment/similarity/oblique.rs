@@ -5,7 +5,6 @@ use super::endoscope::endoscope_camera;
 use super::measure::labelled;
 use super::scenery::{BESIDE_LENS, surroundings};
 use crate::Result;
-use crate::study::check_interrupted;
 use glam::DVec3;
 use std::path::Path;
 use trocar_camera::{ColorImage, DepthImage, DepthNoise, Mask};
@@ -13,6 +12,7 @@ use trocar_core::{Pose, Progress};
 use trocar_geometry::io::{Unit, read_surface};
 use trocar_recording::{InstrumentRule, OrganInfo, Recording, RecordingInfo, RecordingWriter};
 use trocar_render::{Appearance, Film, Light, Noise, RayGenerator, RenderSettings, Stage, render};
+use trocar_workflow::check_interrupted;
 use trocar_workflow::truth::DEPTH_UNIT;
 
 /// Width of the pictures (px).

@@ -123,7 +123,7 @@ fn organs(row: &SimilarityRow) -> String {
 fn views(p: &SimilarityPictures, section: Section) -> Result<Section> {
     let part = overlays::crop_box(&p.silhouettes[0], 30, 1.5).unwrap_or([0, 0, p.real.width, p.real.height]);
     let figure = |picture: &ColorImage, alt: &str, caption: &str| -> Result<String> {
-        Ok(page::figure(&figures::img(&overlays::crop(picture, part), alt)?, caption))
+        Ok(figures::figure(&overlays::crop(picture, part), alt, caption)?)
     };
     let bar = page::scale_bar(&SEQUENTIAL, "0", "mean difference of the channels, of 255", "80");
     let legend = page::legend([("both", BOTH), ("real only", ONLY_REAL), ("rendered only", ONLY_RENDERED)]);

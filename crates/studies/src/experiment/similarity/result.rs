@@ -38,8 +38,4 @@ pub struct SimilarityResult {
     pub skipped: Vec<String>,
     /// The paper's figures.
     pub paper: PaperSimilarity,
-    /// Wall time (s).
-    pub seconds: f64,
-    /// Path of the report.
-    pub report: String,
 }

@@ -58,7 +58,7 @@ impl Scenery {
         };
         let coarse: Vec<TriMesh> = made.specimen.organs.iter().map(|o| o.surface.clone()).collect();
         let seen = silhouettes(&coarse, &camera)?;
-        let photo = &made.background;
+        let photo = &made.composite.color;
         let total: usize = coarse.iter().map(|m| m.triangles.len()).sum();
         // Two subdivisions reduce a triangle of 1.5 mm to a pixel at 0.17 m.
         let splits = if 16 * total <= MAX_TRIANGLES { 2 } else { usize::from(4 * total <= MAX_TRIANGLES) };
@@ -67,7 +67,7 @@ impl Scenery {
             (0..splits).for_each(|_| split(mesh));
             project(mesh, k as u16 + 1, photo, &seen, &camera);
         }
-        let mut around = surroundings(photo, &made.depth, made.organs.iter().map(|o| &o.mask), &camera);
+        let mut around = surroundings(photo, &made.composite.depth, made.organs.iter().map(|o| &o.mask), &camera);
         let power = match illumination {
             Illumination::Room => 0.0,
             Illumination::Lamp { beside } => {

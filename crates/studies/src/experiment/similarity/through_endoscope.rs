@@ -6,12 +6,11 @@ use super::measure::{Sides, SimilarityPictures, SimilarityRow, first_frames, lab
 use super::oblique;
 use super::scenery::{BESIDE_LENS, Illumination, Scenery};
 use crate::Result;
-use crate::study::check_interrupted;
 use std::path::Path;
 use trocar_camera::{CameraModel, ColorImage, Mask, UndistortionMap};
 use trocar_core::{Pose, Progress};
 use trocar_reconstruct::{Reconstruction, Settings};
-use trocar_workflow::reconstruct_recording;
+use trocar_workflow::{check_interrupted, reconstruct_recording};
 
 /// Distance at which the endoscope's light renders a white surface white (m), for scenes recorded
 /// in other light.
@@ -70,7 +69,7 @@ pub(super) fn through_endoscope(
         rendered: &rendered,
         covered: &masked(&map, &first.instruments),
         second: second.as_ref().map(|(color, covered)| (color, covered)),
-        composite: Some(&seen(&made.background)),
+        composite: Some(&seen(&made.composite.color)),
     })?;
     if light == Illumination::Room {
         let lit = scenery.through_endoscope(&scope, &Pose::IDENTITY, WHITE_AT, samples)?;

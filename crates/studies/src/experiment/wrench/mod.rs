@@ -7,7 +7,7 @@ mod result;
 
 use crate::Result;
 use crate::names::degrees;
-use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::study::{Job, Kind, Study};
 use clap::Args;
 use glam::{DQuat, DVec3};
 use normal::normals;
@@ -18,6 +18,7 @@ use trocar_robot::instrument::{GRAVITY, Instrument};
 use trocar_robot::wrench::{
     Compensator, ForceKind, Identification, LoadModel, SensorNoise, StaticReading, identify, static_orientations,
 };
+use trocar_workflow::check_interrupted;
 
 /// The paper's weight of an instrument (N).
 const PAPER_WEIGHT: f64 = 4.7;
@@ -76,15 +77,13 @@ impl Study for WrenchExperiment {
         }
         let first = self.weigh(0, self.tilt)?;
         job.claim()?;
-        let measured = self.measure(&first, job.progress)?;
-        let result = WrenchResult { report: job.report(), seconds: job.seconds(), ..measured };
+        let result = self.measure(&first, job.progress)?;
         let document = page::document(&result)?;
         Ok((result, document))
     }
 }
 
 impl WrenchExperiment {
-    /// Noise of one reading.
     fn noise(&self) -> SensorNoise {
         SensorNoise { force: self.force_noise, torque: self.torque_noise }
     }
@@ -158,8 +157,6 @@ impl WrenchExperiment {
             untared_error_mn: error(&|f| f.untared_mn),
             seen_from_mn: ramp.get(hidden.map_or(0, |k| k + 1)).map(|f| f.truth_mn),
             ramp,
-            seconds: 0.0,
-            report: String::new(),
         })
     }
 

@@ -129,21 +129,17 @@ fn touching(r: &WrenchResult) -> Result<Section> {
 }
 
 fn parameters(r: &WrenchResult) -> Section {
-    let head = ["Parameter", "Truth", "Mean error", "Spread", "Predicted", "Within 1.96 deviations"];
     let small = |v: f64| format!("{v:.2e}").replace('-', "\u{2212}");
-    let rows: Vec<Vec<String>> = r
-        .parameters
-        .iter()
-        .map(|p| {
-            vec![
-                format!("{} ({})", p.name, p.unit),
-                fixed(p.truth, 4),
-                small(p.bias),
-                small(p.spread),
-                small(p.predicted),
-                percent(p.within, 1),
-            ]
-        })
-        .collect();
-    Section::new("Parameters", "").table(Table::new(head, rows))
+    let table = Table::of(
+        &r.parameters,
+        &[
+            ("Parameter", &|p| format!("{} ({})", p.name, p.unit)),
+            ("Truth", &|p| fixed(p.truth, 4)),
+            ("Mean error", &|p| small(p.bias)),
+            ("Spread", &|p| small(p.spread)),
+            ("Predicted", &|p| small(p.predicted)),
+            ("Within 1.96 deviations", &|p| percent(p.within, 1)),
+        ],
+    );
+    Section::new("Parameters", "").table(table)
 }

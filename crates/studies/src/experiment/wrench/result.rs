@@ -102,10 +102,6 @@ pub struct WrenchResult {
     pub untared_error_mn: f64,
     /// Contact force from which the tared reading stays above three standard deviations (mN).
     pub seen_from_mn: Option<f64>,
-    /// Wall time (s).
-    pub seconds: f64,
-    /// Path of the report.
-    pub report: String,
 }
 
 /// Cumulative distribution of chi-squared with ten degrees of freedom.
