@@ -15,12 +15,12 @@ use super::grip::Grip;
 use super::phase::Phase;
 use super::script::{AfterHold, CutAt, Script};
 use super::{CHUNK, Policy};
-use crate::stages::{HELD_FOLLOW, HELD_SLIP_MM};
+use crate::judge::{Memory, Sight};
 use crate::{Channels, Episode, Error, Result};
 use glam::DVec3;
 use trocar_cell::{Action, Setpoint};
 use trocar_core::Pose;
-use trocar_scene::TaskName;
+use trocar_scene::{Condition, TaskName};
 
 /// Way along the shaft from which open jaws come (m).
 const BACK: f64 = 0.025;
@@ -87,6 +87,9 @@ const CLOSED: f64 = 0.75;
 
 /// Times that it tries again to grasp, and to cut.
 const TRIES: usize = 3;
+
+/// The stages that say when held tissue is up: until all of their conditions hold, it grasps again.
+const LIFTED: [&str; 2] = ["lift", "held"];
 
 /// How it goes about it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -442,11 +445,15 @@ fn seen(episode: &Episode) -> Channels {
     episode.rows().last().copied().unwrap_or_default()
 }
 
-/// Whether held tissue is up as the task wants it.
+/// Whether held tissue is up as the task's stages of a lift want it, for however long.
 fn is_lifted(episode: &Episode) -> bool {
-    let (seen, task) = (seen(episode).task, &episode.scene().task);
-    let risen = seen.grasped > 0.0 && seen.lift_mm >= task.gates.lift_mm;
-    risen && (task.name != TaskName::GraspLift || (seen.follow >= HELD_FOLLOW && seen.slip_mm < HELD_SLIP_MM))
+    let (program, row) = (episode.program(), seen(episode));
+    let sight = Sight { row: &row, rows: &[], constants: &program.constants };
+    let mut stages = program.stages.iter().filter(|stage| LIFTED.contains(&stage.name.as_str()));
+    stages.all(|stage| {
+        let now: &Condition = if let Condition::Lasts { what, .. } = &stage.when { what } else { &stage.when };
+        sight.holds(now, &mut Memory::new(stage.timers, stage.marks))
+    })
 }
 
 /// Whether what the arm at place `k` holds hangs on nothing that is pinned.
