@@ -37,10 +37,8 @@ const KEEP_S: f64 = 0.5;
 const FAST: f64 = 0.04;
 const SLOW: f64 = 0.025;
 
-/// Tissue is taken this far from the pivot by the grasper (m): in the middle of its jaws.
-const GRASP_DEPTH: f64 = 0.0115;
-/// The cutter takes it farther out (m), where the gap of nearly closed blades is still wider than
-/// their contact skin.
+/// The cutter takes tissue this far from the pivot (m), where the gap of nearly closed blades is
+/// still wider than their contact skin.
 const CUT_DEPTH: f64 = 0.0140;
 
 /// Way along the organ from the middle of the grasp to the cut (m): half of a grasper's blade and
@@ -224,9 +222,9 @@ impl Scripted {
                     Some(script) => (Place::At(script.at), script.approach_offset),
                     None => (Place::InRange([gates.grasp_from, gates.grasp_to], self.outward), 0.0),
                 };
-                let aim = aim::grasp(cell, arms[k], body, place, GRASP_DEPTH, aside)?;
+                let aim = aim::grasp(cell, arms[k], body, place, aside)?;
                 self.grasp = Some(aim);
-                let open = aim.setpoint.with_jaw(1.0);
+                let open = aim.setpoint;
                 let behind = || Ok::<_, Error>(cell.workspace(arms[k])?.behind(&open, BACK));
                 self.to[k] = if self.phase == Phase::Approach { behind()? } else { open };
                 self.time(episode, k, if self.phase == Phase::Approach { FAST } else { SLOW })?

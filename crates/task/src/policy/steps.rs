@@ -18,8 +18,6 @@ use trocar_scene::{ScriptAction, ScriptProgram};
 
 /// Way along the shaft from which open jaws come and to which they draw back (m).
 const BACK: f64 = 0.025;
-/// Tissue is taken this far from the pivot (m): in the middle of the jaws.
-const DEPTH: f64 = 0.0115;
 /// Speed of the tips on the way, at tissue, and with tissue in the jaws (m/s).
 const FAST: f64 = 0.04;
 const SLOW: f64 = 0.025;
@@ -118,8 +116,7 @@ impl Steps {
             (Phase::Approach | Phase::Enter, ScriptAction::Grasp(part)) => {
                 let body = bodies_of(cell, &part.organ).first().copied();
                 let body = body.ok_or_else(|| Error::Option(format!("the scene has no organ '{}'", part.organ)))?;
-                let open =
-                    aim::grasp(cell, name, body, Place::InRange(part.range, 0.0), DEPTH, 0.0)?.setpoint.with_jaw(1.0);
+                let open = aim::grasp(cell, name, body, Place::InRange(part.range, 0.0), 0.0)?.setpoint;
                 let near = phase == Phase::Enter;
                 self.to[k] = if near { open } else { cell.workspace(name)?.behind(&open, BACK) };
                 way(&self.from[k], &self.to[k], if near { SLOW } else { FAST })?
