@@ -137,7 +137,7 @@ fn soft_tissue_is_not_crushed() {
 
 #[test]
 fn wide_organs_are_pinched() {
-    let mut specimen = two_tubes(ONE_END, 3e-3);
+    let mut specimen = two_tubes(ONE_END, 2e-3);
     let wide = &mut specimen.organs[0];
     for p in wide.body.vertices.iter_mut().chain(&mut wide.surface.vertices) {
         (p.y, p.z) = (1.7 * p.y, 1.7 * p.z);
