@@ -140,7 +140,7 @@ fn wide_organs_are_pinched() {
     let mut specimen = two_tubes(ONE_END, 2e-3);
     let wide = &mut specimen.organs[0];
     for p in wide.body.vertices.iter_mut().chain(&mut wide.surface.vertices) {
-        (p.y, p.z) = (1.7 * p.y, 1.7 * p.z);
+        (p.y, p.z) = (2.4 * p.y, 2.4 * p.z);
     }
     let mut scene = waiting("attached(left) in organ[0.3, 0.7]", 8.0);
     scene.task.script = vec![step(Some("organ[0.4, 0.6]"), None)];

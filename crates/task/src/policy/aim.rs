@@ -125,9 +125,19 @@ pub(super) enum Place {
     At(f64),
 }
 
+/// How the blades come to the tissue.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Manner {
+    /// Round it where it is narrow enough, else at its top.
+    #[default]
+    Fitting,
+    /// At its top.
+    Pinching,
+}
+
 /// The aim of `arm` at the cluster of `body` at `place`, `aside` (m) of the closing plane of its
 /// blades, with the opening to come with.
-pub(super) fn grasp(cell: &Cell, arm: &str, body: usize, place: Place, aside: f64) -> Result<Aim> {
+pub(super) fn grasp(cell: &Cell, arm: &str, body: usize, (place, manner): (Place, Manner), aside: f64) -> Result<Aim> {
     let cluster = match place {
         Place::InRange(range, outward) => {
             let s = 0.5 * (range[0] + range[1]) + outward * free_side(cell, body);
@@ -142,7 +152,8 @@ pub(super) fn grasp(cell: &Cell, arm: &str, body: usize, place: Place, aside: f6
     let point = cluster.centroid(cell.world(), body);
     let x = cell.workspace(arm)?.direction_to(point);
     let (width, height) = width_and_height(cell, body, cluster.s, x, point);
-    let (depth, jaw) = if width <= WIDE { (DEPTH, 1.0) } else { (height + BLADES - DIP, PINCH) };
+    let fits = width <= WIDE && manner == Manner::Fitting;
+    let (depth, jaw) = if fits { (DEPTH, 1.0) } else { (height + BLADES - DIP, PINCH) };
     let mut aim = at(cell, arm, body, cluster.s, point, depth)?;
     aim.setpoint = aim.setpoint.with_jaw(jaw);
     if aside == 0.0 {

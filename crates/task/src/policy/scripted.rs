@@ -9,7 +9,7 @@
 //! It looks at where the tissue is, which no policy that is scored may. All it does goes through
 //! actions, and so through controllers, arms and ports where there are any.
 
-use super::aim::{self, Aim, Place, eased};
+use super::aim::{self, Aim, Manner, Place, eased};
 use super::cut_place::cut_place;
 use super::grip::Grip;
 use super::phase::Phase;
@@ -222,7 +222,7 @@ impl Scripted {
                     Some(script) => (Place::At(script.at), script.approach_offset),
                     None => (Place::InRange([gates.grasp_from, gates.grasp_to], self.outward), 0.0),
                 };
-                let aim = aim::grasp(cell, arms[k], body, place, aside)?;
+                let aim = aim::grasp(cell, arms[k], body, (place, Manner::Fitting), aside)?;
                 self.grasp = Some(aim);
                 let open = aim.setpoint;
                 let behind = || Ok::<_, Error>(cell.workspace(arms[k])?.behind(&open, BACK));

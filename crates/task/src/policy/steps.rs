@@ -4,7 +4,7 @@
 //! may, closes the jaws as far as the tissue gives ([`Grip`]), and all it does goes through actions.
 //! An arm that loses what its last step `grasp` took, goes back to that step.
 
-use super::aim::{self, Place, eased};
+use super::aim::{self, Manner, Place, eased};
 use super::grip::Grip;
 use super::scripted::{Scripted, Style};
 use super::{CHUNK, Policy};
@@ -52,8 +52,9 @@ struct Steps {
     to: Vec<Setpoint>,
     last: Vec<Setpoint>,
     until: Memory,
-    /// How each arm closes, and how often it has tried to grasp in the step that took hold last.
+    /// How each arm closes and comes, and how often it has tried in its last step `grasp`.
     grips: Vec<Grip>,
+    manners: Vec<Manner>,
     tries: Vec<usize>,
     /// The step with which each arm took hold of what it is to hold.
     held: Vec<Option<usize>>,
@@ -64,7 +65,7 @@ impl Steps {
         let mut made = Self::default();
         let arms = episode.cell().arms();
         made.last = arms.iter().map(|(side, _)| Ok(episode.cell().setpoint(side.name())?)).collect::<Result<_>>()?;
-        made.grips = vec![Grip::default(); arms.len()];
+        (made.grips, made.manners) = (vec![Grip::default(); arms.len()], vec![Manner::Fitting; arms.len()]);
         (made.tries, made.held) = (vec![0; arms.len()], vec![None; arms.len()]);
         made.enter_step(episode)?;
         Ok(made)
@@ -90,7 +91,7 @@ impl Steps {
             ScriptAction::Grasp(_) => {
                 let k = Self::arm(episode, step)?;
                 if self.held[k] != Some(self.step) {
-                    (self.grips[k], self.tries[k]) = (Grip::default(), 0);
+                    (self.grips[k], self.manners[k], self.tries[k]) = (Grip::default(), Manner::Fitting, 0);
                 }
                 Phase::Approach
             }
@@ -116,7 +117,8 @@ impl Steps {
             (Phase::Approach | Phase::Enter, ScriptAction::Grasp(part)) => {
                 let body = bodies_of(cell, &part.organ).first().copied();
                 let body = body.ok_or_else(|| Error::Option(format!("the scene has no organ '{}'", part.organ)))?;
-                let open = aim::grasp(cell, name, body, Place::InRange(part.range, 0.0), 0.0)?.setpoint;
+                let place = Place::InRange(part.range, 0.0);
+                let open = aim::grasp(cell, name, body, (place, self.manners[k]), 0.0)?.setpoint;
                 let near = phase == Phase::Enter;
                 self.to[k] = if near { open } else { cell.workspace(name)?.behind(&open, BACK) };
                 way(&self.from[k], &self.to[k], if near { SLOW } else { FAST })?
@@ -163,6 +165,10 @@ impl Steps {
                 self.tries[k] += 1;
                 let disabled = episode.cell().disabled_contact(step.arm.name())?.0;
                 self.grips[k].missed(disabled);
+                if disabled {
+                    // There is no room for the blades beside the tissue.
+                    self.manners[k] = Manner::Pinching;
+                }
                 self.enter(episode, Phase::Approach)
             }
             Some(Phase::Open) => self.enter(episode, Phase::Withdraw),
