@@ -140,7 +140,12 @@ fn wide_organs_are_pinched() {
     let mut specimen = two_tubes(ONE_END, 2e-3);
     let wide = &mut specimen.organs[0];
     for p in wide.body.vertices.iter_mut().chain(&mut wide.surface.vertices) {
-        (p.y, p.z) = (2.4 * p.y, 2.4 * p.z);
+        (p.y, p.z) = (1.7 * p.y, 1.7 * p.z);
+    }
+    // The second one lies close beside it, so that there is no room for blades.
+    let beside = &mut specimen.organs[1];
+    for p in beside.body.vertices.iter_mut().chain(&mut beside.surface.vertices) {
+        (p.y, p.z) = (p.y - 0.0124, p.z - 0.012);
     }
     let mut scene = waiting("attached(left) in organ[0.3, 0.7]", 8.0);
     scene.task.script = vec![step(Some("organ[0.4, 0.6]"), None)];
