@@ -66,7 +66,7 @@ impl Solver {
     fn prepare(&mut self, potential: &Potential<'_>, fixed: &[bool]) -> Result<&mut System, Failure> {
         if self.system.as_ref().is_none_or(|system| system.fixed != fixed) {
             let matrix = Stiffness::new(&potential.elastic.tets, fixed);
-            let factor = Factor::new(&matrix).ok_or(Failure::Singular)?;
+            let factor = Factor::new(&matrix, &potential.elastic.rest);
             self.system = Some(System { fixed: fixed.to_vec(), matrix, factor });
         }
         self.system.as_mut().ok_or(Failure::Singular)

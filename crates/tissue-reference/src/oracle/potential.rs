@@ -8,6 +8,8 @@ use trocar_tissue::{Body, Hyperelastic, Support, SupportContact};
 
 /// Constants of a body's energies, nodes in their original order.
 pub(super) struct Elastic {
+    /// (m)
+    pub rest: Vec<DVec3>,
     pub tets: Vec<[u32; 4]>,
     /// Rest gradients of the shape functions (1/m).
     pub gradients: Vec<[DVec3; 4]>,
@@ -32,6 +34,7 @@ impl Elastic {
         let mesh = body.rest();
         let dashpots = body.dashpots().into_iter();
         Self {
+            rest: mesh.vertices.clone(),
             tets: mesh.tets.clone(),
             gradients: (0..mesh.tets.len()).map(|t| shape_gradients(mesh, t)).collect(),
             volumes: body.volumes().to_vec(),

@@ -23,17 +23,12 @@ fn noises(n: usize, seed: usize, size: f64) -> Vec<DVec3> {
 
 /// The matrix times a vector over all nodes, whose entries at fixed nodes count as 0.
 fn times(matrix: &Stiffness, v: &[DVec3]) -> Vec<DVec3> {
-    let (pattern, free) = (matrix.pattern(), matrix.free());
     let mut out = vec![DVec3::ZERO; v.len()];
-    for column in 0..3 * free.len() {
-        let (j, c) = (free[column / 3], column % 3);
-        for k in pattern.col_ptr()[column]..pattern.col_ptr()[column + 1] {
-            let row = pattern.row_idx()[k];
-            let (i, r) = (free[row / 3], row % 3);
-            out[i][r] += matrix.values()[k] * v[j][c];
-            if (i, r) != (j, c) {
-                out[j][c] += matrix.values()[k] * v[i][r];
-            }
+    for (i, j, block) in matrix.matrix().blocks() {
+        let (i, j) = (matrix.free()[i as usize], matrix.free()[j as usize]);
+        out[i] += *block * v[j];
+        if i != j {
+            out[j] += block.transpose() * v[i];
         }
     }
     out

@@ -90,12 +90,13 @@ impl QuasiNewtonSolver {
     /// For `body` stepped by frames of `dt` (s); `single_thread`: the calling thread does all the
     /// work.
     pub fn new(settings: QuasiNewton, body: &Body, dt: f64, single_thread: bool) -> Self {
-        let (system, layout) = System::new(body, dt / settings.substeps as f64);
+        let level = Isa::detect().level();
+        let (system, layout) = System::new(level, body, dt / settings.substeps as f64);
         let sweeps = Descent { substeps: settings.substeps, iterations: FALLBACK_SWEEPS, start: Start::Adaptive };
         let limits = Vec::with_capacity(2 * body.len());
         Self {
             settings,
-            level: Isa::detect().level(),
+            level,
             system,
             elements: Elements::new(&layout, body),
             iterate: Iterate::new(&layout),
@@ -154,9 +155,9 @@ impl QuasiNewtonSolver {
     /// Factorises again if other nodes are held, in contact, or in a compliant grasp than in the
     /// factor.
     fn refresh_system(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState) {
-        let Self { system, layout, held, touching, .. } = self;
+        let Self { level, system, layout, held, touching, .. } = self;
         let stiffness = |vertex: usize| touching.contacts.stiffness(frame, body, state, vertex);
-        if system.refresh(body, layout, held, &state.warm.supported, stiffness) {
+        if system.refresh(*level, body, layout, held, &state.warm.supported, stiffness) {
             self.rest.correction = None;
         }
     }

@@ -18,7 +18,6 @@
 mod apply_step;
 mod body_system;
 mod coarse;
-mod dissection;
 mod elements;
 mod factor;
 mod history;

@@ -13,7 +13,7 @@ use fearless_simd::{Level, dispatch};
 
 /// The preconditioner of one body.
 pub(super) struct System {
-    /// None if no node is free or memory is short.
+    /// None if no node is free.
     factor: Option<Factor>,
     /// Contacts that are not in the factor, or no longer there.
     update: LowRankUpdate,
@@ -34,14 +34,14 @@ pub(super) struct System {
 
 impl System {
     /// For `body` with substeps of `h` (s), and the body's layout in the order of elimination.
-    pub fn new(body: &Body, h: f64) -> (Self, Layout) {
+    pub fn new(level: Level, body: &Body, h: f64) -> (Self, Layout) {
         let mut factor = Factor::new(body, h);
         let free: Vec<u32> = (0..body.len() as u32).filter(|i| !body.pinned[*i as usize]).collect();
         let layout = Layout::new(body, factor.as_ref().map_or(&free, |factor| &factor.order));
         let (held, contacts) = (vec![false; layout.free], vec![0.0; layout.free]);
         if let Some(made) = &mut factor {
             made.set_step(&layout.masses, h);
-            if !made.factorise(&held, &contacts) {
+            if !made.factorise(level, &held, &contacts) {
                 factor = None;
             }
         }
@@ -64,6 +64,7 @@ impl System {
     /// did.
     pub fn refresh(
         &mut self,
+        level: Level,
         body: &Body,
         layout: &Layout,
         held: &[bool],
@@ -85,7 +86,7 @@ impl System {
                     self.known.push((i as u32, body.vertices[*vertex as usize].contact_stiffness));
                 }
             }
-            self.usable = factor.factorise(held, &self.contacts);
+            self.usable = factor.factorise(level, held, &self.contacts);
             self.held.copy_from_slice(held);
         }
         stale

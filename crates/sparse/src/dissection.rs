@@ -5,6 +5,7 @@
 //! gives the smallest separator. The separator is a minimum vertex cover of the cut edges (Koenig's
 //! theorem), and is eliminated after the halves.
 
+use crate::BlockMatrix;
 use glam::DVec3;
 use std::collections::VecDeque;
 
@@ -12,21 +13,25 @@ use std::collections::VecDeque;
 const MAX_LEAF_NODES: usize = 14;
 
 /// A mesh graph: the neighbours of node i are `to[first[i]..first[i + 1]]`.
-pub(super) struct Graph {
+pub(crate) struct Graph {
     first: Vec<u32>,
     to: Vec<u32>,
 }
 
 impl Graph {
-    /// From lists of neighbours.
-    pub fn new(neighbours: &[Vec<u32>]) -> Self {
-        let mut first = vec![0];
-        let mut to = Vec::new();
-        for list in neighbours {
-            to.extend_from_slice(list);
-            first.push(to.len() as u32);
+    /// The graph of a matrix's blocks.
+    pub fn new(matrix: &BlockMatrix) -> Self {
+        let mut lists = vec![Vec::new(); matrix.len()];
+        for (i, j, _) in matrix.blocks().filter(|(i, j, _)| i != j) {
+            lists[i as usize].push(j);
+            lists[j as usize].push(i);
         }
-        Self { first, to }
+        let mut first = vec![0];
+        first.extend(lists.iter().scan(0, |sum, list| {
+            *sum += list.len() as u32;
+            Some(*sum)
+        }));
+        Self { first, to: lists.concat() }
     }
 
     pub fn neighbours(&self, i: u32) -> &[u32] {
@@ -40,7 +45,7 @@ impl Graph {
 
 /// The nodes of `graph`, which lie at `positions`, in the order of elimination: first eliminated
 /// first.
-pub(super) fn dissect(graph: &Graph, positions: &[DVec3]) -> Vec<u32> {
+pub(crate) fn dissect(graph: &Graph, positions: &[DVec3]) -> Vec<u32> {
     let n = graph.len();
     let mut work = Work {
         graph,

@@ -1,0 +1,23 @@
+//! Sparse Cholesky factors of symmetric positive definite matrices of 3x3 blocks, as the stiffness
+//! of a mesh of tetrahedra is.
+//!
+//! [`BlockMatrix`] is the matrix, [`Cholesky`] its factor. An elimination order is found by nested
+//! dissection once for a pattern, and numbers follow as often as needed. Independent subtrees and
+//! large fronts share the threads of the current rayon pool. The bits of a factor depend neither on
+//! the number of threads nor on the instruction set.
+
+mod cholesky;
+mod dense;
+mod dissection;
+mod matrix;
+mod real;
+mod supernodes;
+
+pub use cholesky::{Cholesky, Panel};
+pub use fearless_simd::Level;
+pub use matrix::BlockMatrix;
+pub use real::Real;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
