@@ -75,7 +75,7 @@ def test_wrong_actions_are_refused_by_name_and_change_nothing(one):
         one.unwrapped.step(np.zeros(3))
     assert one.unwrapped.state_hash == before
     for options, words in [
-        ({"scene": "cell-b"}, "cell-b"),
+        ({"scene": "cell-d"}, "cell-d"),
         ({"obs": "smell"}, "smell"),
         ({"actions": "joints"}, "pivots"),
         ({"episode_s": -1.0}, "episode_s"),

@@ -66,7 +66,7 @@ fn mistakes_are_one_line_and_leave_nothing() {
         assert!(!out.exists());
     };
     refused(&["cell-a"], "seen.bmp", &["seen.bmp", ".png", ".webp", ".mp4"]);
-    refused(&["cell-b"], "seen.png", &["cell-b", "cell-a"]);
+    refused(&["cell-d"], "seen.png", &["cell-d", "cell-a"]);
     refused(&["cell-a", "--at", "-1"], "seen.png", &["--at is -1", "[0, 600]"]);
     refused(&["cell-a", "--at", "1"], "seen.webp", &["--at", ".png"]);
     refused(&["cell-a"], "no/such/folder/seen.webp", &["the folder", "does not exist"]);

@@ -49,7 +49,7 @@ fn mistakes_are_one_line() {
         assert_eq!(String::from_utf8_lossy(&output.stderr), expected);
         assert!(output.stdout.is_empty());
     }
-    let unknown = trocar(&["scene", "show", "cell-b"]);
+    let unknown = trocar(&["scene", "show", "cell-d"]);
     assert!(String::from_utf8_lossy(&unknown.stderr).contains("did you mean 'cell-a'?"));
 }
 

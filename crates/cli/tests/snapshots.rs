@@ -84,7 +84,7 @@ fn errors_of_wrong_inputs() {
         ("reconstruct-without-units", &["reconstruct", "--surface", "damaged.stl", "-o", "out"]),
         ("reconstruct-wrong-unit", &["reconstruct", "--surface", "damaged.stl", "--units", "inch", "-o", "out"]),
         ("scene-missing", &["scene", "check", "nowhere.toml"]),
-        ("scene-builtin", &["scene", "show", "cell-b"]),
+        ("scene-builtin", &["scene", "show", "cell-d"]),
         ("scene-unit", &["scene", "check", "unit.toml"]),
         ("scene-key", &["scene", "check", "key.toml"]),
         ("scene-nan", &["scene", "check", "nan.toml"]),

@@ -12,7 +12,7 @@ pub struct Builtin {
 }
 
 /// The built-in scenes.
-pub const BUILTINS: [Builtin; 2] = [
+pub const BUILTINS: [Builtin; 6] = [
     Builtin {
         name: "cell-a",
         summary: "the paper's two-arm cell around phantom A: grasper left, cutter right, resection of the appendix",
@@ -22,6 +22,26 @@ pub const BUILTINS: [Builtin; 2] = [
         name: "cell-a-retraction",
         summary: "the same cell: the grasper pulls the appendix aside and holds it, as a task of stages in the scene",
         text: include_str!("../scenes/cell-a-retraction.toml"),
+    },
+    Builtin {
+        name: "cell-a-stretch",
+        summary: "the same cell with two graspers, which stretch the appendix between them with 0.3 to 1 N",
+        text: include_str!("../scenes/cell-a-stretch.toml"),
+    },
+    Builtin {
+        name: "cell-a-bowel",
+        summary: "the same cell with two graspers, which run a loop of bowel hand over hand",
+        text: include_str!("../scenes/cell-a-bowel.toml"),
+    },
+    Builtin {
+        name: "cell-b",
+        summary: "the cell around phantom B, another rabbit: the grasper lifts a shorter appendix",
+        text: include_str!("../scenes/cell-b.toml"),
+    },
+    Builtin {
+        name: "cell-b-resection",
+        summary: "the same cell: resection of that appendix",
+        text: include_str!("../scenes/cell-b-resection.toml"),
     },
 ];
 

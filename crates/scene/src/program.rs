@@ -22,6 +22,9 @@ pub struct TaskContext {
     /// The task's own constants.
     #[serde(default)]
     pub constants: BTreeMap<String, f64>,
+    /// Names of the scene's cameras.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<String>,
 }
 
 /// A mistake in a task: the field after `task.`, and what is wrong.
@@ -160,6 +163,7 @@ impl Scene {
             organ: self.task.organ.clone(),
             arms: self.tools().iter().map(|tool| (tool.arm.name, tool.instrument.kind)).collect(),
             constants: self.task.constants.clone(),
+            cameras: self.cameras.iter().map(|camera| camera.name.clone()).collect(),
         })
     }
 
@@ -215,6 +219,7 @@ impl TaskContext {
             organ: &self.organ,
             organs,
             arms: &self.arms,
+            cameras: &self.cameras,
             constants: &names,
             measures: Vec::new(),
             needs: Needs::default(),

@@ -482,8 +482,9 @@ fn files() {
     );
     assert_eq!(read(&[0xff, 0xfe]), "/scene.toml: stream did not contain valid UTF-8");
     assert_eq!(read(b""), "/scene.toml: line 1: missing field `name`");
-    let unknown = "no scene 'cell-b'; it must be a TOML file or one of the built-in scenes cell-a, cell-a-retraction; did you mean 'cell-a'?";
-    assert_eq!(Scene::read("cell-b").unwrap_err().to_string(), unknown);
+    let unknown = "no scene 'cell-d'; it must be a TOML file or one of the built-in scenes cell-a, cell-a-retraction, cell-a-stretch, cell-a-bowel, cell-b, cell-b-resection; \
+                   did you mean 'cell-a'?";
+    assert_eq!(Scene::read("cell-d").unwrap_err().to_string(), unknown);
     let absent = Scene::read("absent/scene.toml").unwrap_err().to_string();
     assert_eq!(absent, "absent/scene.toml: No such file or directory (os error 2)");
     // What a scene names starts from its own folder, and its organs are known.

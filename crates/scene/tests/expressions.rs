@@ -79,6 +79,13 @@ fn mistakes_are_told_with_their_column() {
         ("grasped and 3", "column 13: is a number where a condition is needed; compare it, for example with `> 0.5`"),
         ("lift_mm + grasped > 3 mm", "column 11: is a plain number, and what it goes with is a length (mm)"),
         ("right.tip > 3", "column 1: right.tip is a place and no number"),
+        (
+            "visible(endoscop, organ) > 0.5",
+            "column 9: there is no camera 'endoscop'; the scene has endoscope, d405, recording; did you mean 'endoscope'?",
+        ),
+        ("visible(d405) > 0.5", "column 1: visible has 1 arguments; it needs a camera and an organ"),
+        ("visible(d405, left.tip) > 0.5", "column 15: an organ is needed"),
+        ("visible(d405, organ) > 3 mm", "column 24: is a length (mm), and what it goes with is a plain number"),
         ("lift_mm > 1.2.3", "column 11: '1.2.3' is no number"),
         ("§ > 1", "column 1: '\\u{a7}' is not expected here; a name or a number is"),
         ("", "column 1: a value is missing at the end"),

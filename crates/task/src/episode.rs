@@ -182,7 +182,8 @@ impl Episode {
         self.cell.restart(&self.built.settled, &starts)?;
         let task = &self.scene.task;
         let targets = if self.program.needs_targets { targets(&self.cell, seed)? } else { Vec::new() };
-        let measures = Measures::begin(&self.cell, &self.program.measures)?;
+        let recording = self.built.specimen.camera.as_ref();
+        let measures = Measures::begin(&self.cell, &self.arranged, recording, &self.program.measures)?;
         self.now = Now {
             seed,
             subject: Subject::new(&self.cell, &task.organ, &task.gates, targets, measures),

@@ -167,6 +167,7 @@ mod tests {
             organ: "appendix".into(),
             arms: vec![(Side::Left, InstrumentKind::Grasper), (Side::Right, InstrumentKind::Cutter)],
             constants: BTreeMap::from([("most_n".to_owned(), 2.0)]),
+            ..TaskContext::default()
         };
         context.program(&Gates::default()).unwrap()
     }

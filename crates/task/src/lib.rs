@@ -25,6 +25,7 @@ mod storage;
 mod summary;
 mod supply;
 mod sweep;
+mod visible;
 mod why;
 
 pub use bounds::Bounds;

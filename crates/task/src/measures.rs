@@ -1,33 +1,53 @@
 //! What a task measures beside the channels: distances, displacements and what is held where.
 
 use crate::measure::{MID_JAWS, between_blades, bodies_of, flag, nearest};
+use crate::visible::{Surface, View};
 use crate::{Channels, Result};
 use glam::DVec3;
+use std::sync::Arc;
+use trocar_camera::Camera;
 use trocar_cell::Cell;
-use trocar_scene::{MOST_MEASURES, Measure, Part, Place, Side, Target};
+use trocar_scene::{MOST_MEASURES, Measure, Part, Place, Scene, Side, Target};
 
 /// The measures of a task, and where what moves was at the episode's start (m, cell).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Measures {
     list: Vec<Measure>,
     origins: Vec<DVec3>,
+    /// What sees the parts of [`Measure::Visible`], in their order.
+    views: Vec<View>,
 }
 
 impl Measures {
-    /// At the start of an episode.
-    pub fn begin(cell: &Cell, list: &[Measure]) -> Result<Self> {
+    /// At the start of an episode in `cell`, with the cameras of `scene`; `recording` is the
+    /// specimen's camera.
+    pub fn begin(cell: &Cell, scene: &Scene, recording: Option<&Camera>, list: &[Measure]) -> Result<Self> {
         let origin = |measure: &Measure| match measure {
             Measure::Moved(what) | Measure::Aside(what) | Measure::Risen(what) => place(cell, what),
-            Measure::Distance(..) | Measure::Held(..) | Measure::InMouth(..) => Ok(DVec3::ZERO),
+            Measure::Distance(..) | Measure::Held(..) | Measure::InMouth(..) | Measure::Visible(..) => Ok(DVec3::ZERO),
         };
-        Ok(Self { list: list.to_vec(), origins: list.iter().map(origin).collect::<Result<_>>()? })
+        let sees = list.iter().any(|measure| matches!(measure, Measure::Visible(..)));
+        let surfaces = if sees { Surface::all(cell) } else { Arc::default() };
+        let views = list.iter().filter_map(|measure| match measure {
+            Measure::Visible(camera, part) => Some(View::new(scene, camera, recording, part, &surfaces)),
+            _ => None,
+        });
+        Ok(Self {
+            list: list.to_vec(),
+            origins: list.iter().map(origin).collect::<Result<_>>()?,
+            views: views.collect::<Result<_>>()?,
+        })
     }
 
     /// Fills the measures of `row`.
     pub fn measure(&self, cell: &Cell, row: &mut Channels) -> Result<()> {
         let mut all = [0.0; MOST_MEASURES];
+        let mut views = self.views.iter();
         for ((value, measure), origin) in all.iter_mut().zip(&self.list).zip(&self.origins) {
-            *value = one(cell, measure, *origin)?;
+            *value = match measure {
+                Measure::Visible(..) => views.next().map_or(Ok(0.0), |view| view.share(cell))?,
+                other => one(cell, other, *origin)?,
+            };
         }
         row.measures = all;
         Ok(())
@@ -62,6 +82,8 @@ fn one(cell: &Cell, measure: &Measure, origin: DVec3) -> Result<f64> {
             1e3 * (by - by.dot(up) * up).length()
         }
         Measure::Risen(what) => 1e3 * (place(cell, what)? - origin).dot(up),
+        // See `Measures::measure`.
+        Measure::Visible(..) => 0.0,
     })
 }
 

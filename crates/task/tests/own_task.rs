@@ -2,7 +2,7 @@
 //! stored and swept, an abort ends it, and a replay needs nothing but the episode file.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use trocar_scene::{Abort, Scene, ScriptStep, Side, Stage, StageOrder, TaskName};
+use trocar_scene::{Abort, Scene, ScriptStep, Side, Stage, StageOrder, TaskName, View};
 use trocar_task::{End, Episode, EpisodeFile, GateRange, Recording, policy, prompt, read_channels, run, sweep};
 use trocar_testing::tube::{ONE_END, resection, two_tubes};
 
@@ -93,4 +93,65 @@ fn an_abort_ends_it_and_any_order_is_any() {
     let recording = record(&scene, 1);
     let times: Vec<f64> = recording.summary.progress.stages.iter().map(|s| s.time_s.unwrap()).collect();
     assert!(recording.summary.passed && times[0] > times[1] && times[0] > times[2], "{times:?}");
+}
+
+/// A scene whose script grasps and waits, for at most `seconds`.
+fn waiting(when: &str, seconds: f64) -> Scene {
+    let mut scene = pull_aside();
+    scene.task.stages = vec![stage("it", when)];
+    scene.task.script = vec![step(None, None)];
+    scene.task.episode_s = seconds;
+    scene
+}
+
+#[test]
+fn a_camera_sees_what_nothing_hides() {
+    let mut scene =
+        waiting("visible(behind, organ) > 2 and visible(before, organ) > 2 and visible(aside, organ) > 2", 1.0);
+    // The second tube is 25 mm nearer to the arms and 12 mm lower.
+    let camera = |name: &str, eye_m: [f64; 3], target_m: [f64; 3]| {
+        let mut camera = scene.cameras[0].clone();
+        (camera.name, camera.view) = (name.to_owned(), View::LookAt { eye_m, target_m, up: [0.0, 0.0, 1.0] });
+        camera
+    };
+    let middle = [0.0, 0.46, 0.045];
+    scene.cameras = vec![
+        camera("behind", [0.0, 0.53, 0.05], middle),
+        camera("before", [0.0, 0.40, 0.0162], middle),
+        camera("aside", [0.0, 0.40, 0.0162], [0.0, 0.34, 0.0]),
+    ];
+    let recording = record(&scene, 1);
+    for row in &recording.channels {
+        let [behind, before, aside, ..] = row.measures;
+        assert!(behind > 0.95 && before < 0.1 && aside == 0.0, "{:?}", &row.measures[..3]);
+    }
+}
+
+#[test]
+fn soft_tissue_is_not_crushed() {
+    let mut scene = pull_aside();
+    scene.organs.entry("tube".to_owned()).or_default().material.young_modulus_pa = Some(4000.0);
+    let recording = record(&scene, 1);
+    assert!(recording.summary.passed, "{:?}", recording.summary.why);
+}
+
+#[test]
+fn wide_organs_are_pinched() {
+    let mut specimen = two_tubes(ONE_END, 2e-3);
+    let wide = &mut specimen.organs[0];
+    for p in wide.body.vertices.iter_mut().chain(&mut wide.surface.vertices) {
+        (p.y, p.z) = (1.7 * p.y, 1.7 * p.z);
+    }
+    // The second one lies close beside it, so that there is no room for blades.
+    let beside = &mut specimen.organs[1];
+    for p in beside.body.vertices.iter_mut().chain(&mut beside.surface.vertices) {
+        (p.y, p.z) = (p.y - 0.0124, p.z - 0.012);
+    }
+    let mut scene = waiting("attached(left) in organ[0.3, 0.7]", 8.0);
+    scene.task.script = vec![step(Some("organ[0.4, 0.6]"), None)];
+    let mut episode = Episode::new(&scene, &specimen, 1).unwrap();
+    let mut scripted = policy::named("scripted").unwrap();
+    let recording = run(&mut episode, scripted.as_mut(), 1, &mut |_| true).unwrap();
+    assert!(recording.summary.passed, "{:?}", recording.summary.why);
+    assert!(recording.channels.iter().all(|row| row.task.disabled_contacts == 0.0));
 }

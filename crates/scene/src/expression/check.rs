@@ -12,8 +12,9 @@ type Checked<T> = Result<T, Mistake>;
 /// Most measures of a task: every row has room for as many.
 pub const MOST_MEASURES: usize = 16;
 
-const FUNCTIONS: [&str; 13] = [
-    "attached", "in_mouth", "force", "jaw", "distance", "moved", "aside", "risen", "abs", "min", "max", "clamp", "near",
+const FUNCTIONS: [&str; 14] = [
+    "attached", "in_mouth", "force", "jaw", "distance", "moved", "aside", "risen", "visible", "abs", "min", "max",
+    "clamp", "near",
 ];
 
 /// Whether an expression is a hint's, which looks back over all rows.
@@ -32,6 +33,8 @@ pub(crate) struct Checker<'a> {
     pub organs: Option<&'a [&'a str]>,
     /// The scene's arms, left first.
     pub arms: &'a [(Side, InstrumentKind)],
+    /// Names of the scene's cameras.
+    pub cameras: &'a [String],
     /// Names of gates and constants, as `gates.lift_mm`.
     pub constants: &'a [String],
     /// Measures so far.
@@ -352,6 +355,12 @@ impl Checker<'_> {
                 };
                 Ok((self.measure(at, measure)?, millimetres))
             }
+            "visible" => {
+                let usage = "a camera and an organ, such as visible(endoscope, organ.gallbladder[0, 0.3])";
+                let [camera, what] = self.arguments(at, name, arguments, usage)?;
+                let measure = Measure::Visible(self.camera(camera)?, self.part(what)?);
+                Ok((self.measure(at, measure)?, PLAIN))
+            }
             "abs" => {
                 let [what] = self.arguments(at, name, arguments, "one number")?;
                 let (number, kind) = self.number(what)?;
@@ -438,6 +447,20 @@ impl Checker<'_> {
         };
         self.has_arm(at, side)?;
         Ok(side)
+    }
+
+    /// The camera that `tree` names.
+    fn camera(&self, tree: &Tree) -> Checked<String> {
+        let known = || self.cameras.iter().map(String::as_str);
+        match &tree.node {
+            Node::Name(name) if self.cameras.contains(name) => Ok(name.clone()),
+            Node::Name(name) => {
+                let all: Vec<&str> = known().collect();
+                let (hint, all) = (likeness(name, known()), all.join(", "));
+                Err(Mistake::new(tree.at, format!("there is no camera '{}'; the scene has {all}{hint}", shown(name))))
+            }
+            _ => Err(Mistake::new(tree.at, "a camera of the scene is needed, such as endoscope")),
+        }
     }
 
     fn has_arm(&self, at: usize, side: Side) -> Checked<()> {

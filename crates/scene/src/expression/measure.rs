@@ -45,13 +45,16 @@ pub enum Measure {
     Aside(Target),
     /// Rise since the episode's start (mm).
     Risen(Target),
+    /// Share of what a camera would see of a part of an organ if nothing hid it, that it sees: 0 to
+    /// 1.
+    Visible(String, Part),
 }
 
 impl Measure {
     /// The organ that it is about.
     pub fn organ(&self) -> Option<&str> {
         match self {
-            Self::Held(_, organ) | Self::InMouth(_, organ) => Some(organ),
+            Self::Held(_, organ) | Self::InMouth(_, organ) | Self::Visible(_, Part { organ, .. }) => Some(organ),
             Self::Distance(_, target) | Self::Moved(target) | Self::Aside(target) | Self::Risen(target) => match target
             {
                 Target::Part(part) => Some(&part.organ),
@@ -96,6 +99,7 @@ impl Display for Measure {
             Self::Moved(what) => write!(f, "moved({what})"),
             Self::Aside(what) => write!(f, "aside({what})"),
             Self::Risen(what) => write!(f, "risen({what})"),
+            Self::Visible(camera, part) => write!(f, "visible({camera}, {part})"),
         }
     }
 }

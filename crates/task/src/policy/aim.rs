@@ -19,6 +19,19 @@ const CLEAR_WORTH: f64 = 0.1;
 /// Fewest nodes that are worth a grasp.
 const FEWEST: usize = 8;
 
+/// A grasper takes tissue this far from the pivot (m): in the middle of its jaws.
+const DEPTH: f64 = 0.0115;
+
+/// Tissue wider than this (m) does not go between the blades there, which would press on it and on
+/// what lies beside it. Their ends then pinch its top: this far below its highest point (m), opened
+/// by this share.
+const WIDE: f64 = 0.0115;
+const DIP: f64 = 0.0035;
+const PINCH: f64 = 0.7;
+
+/// Length of the blades (m).
+const BLADES: f64 = 0.021;
+
 /// A tip's pose, and the coordinates nearest to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Aim {
@@ -30,19 +43,39 @@ pub(super) struct Aim {
     pub s: f64,
 }
 
-/// Middle of the organ at organ coordinate `s` as it is now (m): of its nodes there.
-pub(super) fn middle(cell: &Cell, body: usize, s: f64) -> Option<DVec3> {
-    let (world, mut wide) = (cell.world(), SLICE);
+/// The nodes of the organ at organ coordinate `s`.
+fn slice(cell: &Cell, body: usize, s: f64) -> Option<Vec<u32>> {
+    let (axis, mut wide) = (&cell.world().axes[body], SLICE);
     // A coarse mesh may have no node in a thin slice.
     while wide < 0.6 {
-        let near = |i: &u32| (world.axes[body].s[*i as usize] - s).abs() <= wide;
-        let nodes: Vec<u32> = (0..world.axes[body].s.len() as u32).filter(near).collect();
+        let near = |i: &u32| (axis.s[*i as usize] - s).abs() <= wide;
+        let nodes: Vec<u32> = (0..axis.s.len() as u32).filter(near).collect();
         if nodes.len() >= FEWEST {
-            return Some(world.state.centroid(&world.model, body, &nodes));
+            return Some(nodes);
         }
         wide *= 2.0;
     }
     None
+}
+
+/// Middle of the organ at organ coordinate `s` as it is now (m): of its nodes there.
+pub(super) fn middle(cell: &Cell, body: usize, s: f64) -> Option<DVec3> {
+    let world = cell.world();
+    Some(world.state.centroid(&world.model, body, &slice(cell, body, s)?))
+}
+
+/// For jaws that come along `x`: the width of the organ at `s` across its direction, and its height
+/// above `point` (m).
+fn width_and_height(cell: &Cell, body: usize, s: f64, x: DVec3, point: DVec3) -> (f64, f64) {
+    let world = cell.world();
+    let across = along(cell, body, s).cross(x).normalize_or_zero();
+    let (mut low, mut high, mut top) = (f64::INFINITY, f64::NEG_INFINITY, 0.0_f64);
+    for i in slice(cell, body, s).unwrap_or_default() {
+        let from = world.state.position(&world.model, body, i as usize) - point;
+        (low, high) = (low.min(from.dot(across)), high.max(from.dot(across)));
+        top = top.max(-from.dot(x));
+    }
+    ((high - low).max(0.0), top)
 }
 
 /// Direction of the organ at `s` as it lies now.
@@ -92,9 +125,19 @@ pub(super) enum Place {
     At(f64),
 }
 
-/// The aim of `arm` at the cluster of `body` at `place`, `depth` (m) from the pivot between its
-/// blades and `aside` (m) of their closing plane.
-pub(super) fn grasp(cell: &Cell, arm: &str, body: usize, place: Place, depth: f64, aside: f64) -> Result<Aim> {
+/// How the blades come to the tissue.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Manner {
+    /// Round it where it is narrow enough, else at its top.
+    #[default]
+    Fitting,
+    /// At its top.
+    Pinching,
+}
+
+/// The aim of `arm` at the cluster of `body` at `place`, `aside` (m) of the closing plane of its
+/// blades, with the opening to come with.
+pub(super) fn grasp(cell: &Cell, arm: &str, body: usize, (place, manner): (Place, Manner), aside: f64) -> Result<Aim> {
     let cluster = match place {
         Place::InRange(range, outward) => {
             let s = 0.5 * (range[0] + range[1]) + outward * free_side(cell, body);
@@ -106,7 +149,13 @@ pub(super) fn grasp(cell: &Cell, arm: &str, body: usize, place: Place, depth: f6
         let name = cell.world().model.bodies()[body].name();
         return Err(Error::Option(format!("organ '{name}' has no free node to grasp: all are pinned; pin fewer")));
     };
-    let aim = at(cell, arm, body, cluster.s, cluster.centroid(cell.world(), body), depth)?;
+    let point = cluster.centroid(cell.world(), body);
+    let x = cell.workspace(arm)?.direction_to(point);
+    let (width, height) = width_and_height(cell, body, cluster.s, x, point);
+    let fits = width <= WIDE && manner == Manner::Fitting;
+    let (depth, jaw) = if fits { (DEPTH, 1.0) } else { (height + BLADES - DIP, PINCH) };
+    let mut aim = at(cell, arm, body, cluster.s, point, depth)?;
+    aim.setpoint = aim.setpoint.with_jaw(jaw);
     if aside == 0.0 {
         return Ok(aim);
     }

@@ -9,18 +9,18 @@
 //! It looks at where the tissue is, which no policy that is scored may. All it does goes through
 //! actions, and so through controllers, arms and ports where there are any.
 
-use super::aim::{self, Aim, Place, eased};
+use super::aim::{self, Aim, Manner, Place, eased};
 use super::cut_place::cut_place;
 use super::grip::Grip;
 use super::phase::Phase;
 use super::script::{AfterHold, CutAt, Script};
 use super::{CHUNK, Policy};
-use crate::stages::{HELD_FOLLOW, HELD_SLIP_MM};
+use crate::judge::{Memory, Sight};
 use crate::{Channels, Episode, Error, Result};
 use glam::DVec3;
 use trocar_cell::{Action, Setpoint};
 use trocar_core::Pose;
-use trocar_scene::TaskName;
+use trocar_scene::{Condition, TaskName};
 
 /// Way along the shaft from which open jaws come (m).
 const BACK: f64 = 0.025;
@@ -37,10 +37,8 @@ const KEEP_S: f64 = 0.5;
 const FAST: f64 = 0.04;
 const SLOW: f64 = 0.025;
 
-/// Tissue is taken this far from the pivot by the grasper (m): in the middle of its jaws.
-const GRASP_DEPTH: f64 = 0.0115;
-/// The cutter takes it farther out (m), where the gap of nearly closed blades is still wider than
-/// their contact skin.
+/// The cutter takes tissue this far from the pivot (m), where the gap of nearly closed blades is
+/// still wider than their contact skin.
 const CUT_DEPTH: f64 = 0.0140;
 
 /// Way along the organ from the middle of the grasp to the cut (m): half of a grasper's blade and
@@ -87,6 +85,9 @@ const CLOSED: f64 = 0.75;
 
 /// Times that it tries again to grasp, and to cut.
 const TRIES: usize = 3;
+
+/// The stages that say when held tissue is up: until all of their conditions hold, it grasps again.
+const LIFTED: [&str; 2] = ["lift", "held"];
 
 /// How it goes about it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -221,9 +222,9 @@ impl Scripted {
                     Some(script) => (Place::At(script.at), script.approach_offset),
                     None => (Place::InRange([gates.grasp_from, gates.grasp_to], self.outward), 0.0),
                 };
-                let aim = aim::grasp(cell, arms[k], body, place, GRASP_DEPTH, aside)?;
+                let aim = aim::grasp(cell, arms[k], body, (place, Manner::Fitting), aside)?;
                 self.grasp = Some(aim);
-                let open = aim.setpoint.with_jaw(1.0);
+                let open = aim.setpoint;
                 let behind = || Ok::<_, Error>(cell.workspace(arms[k])?.behind(&open, BACK));
                 self.to[k] = if self.phase == Phase::Approach { behind()? } else { open };
                 self.time(episode, k, if self.phase == Phase::Approach { FAST } else { SLOW })?
@@ -442,11 +443,15 @@ fn seen(episode: &Episode) -> Channels {
     episode.rows().last().copied().unwrap_or_default()
 }
 
-/// Whether held tissue is up as the task wants it.
+/// Whether held tissue is up as the task's stages of a lift want it, for however long.
 fn is_lifted(episode: &Episode) -> bool {
-    let (seen, task) = (seen(episode).task, &episode.scene().task);
-    let risen = seen.grasped > 0.0 && seen.lift_mm >= task.gates.lift_mm;
-    risen && (task.name != TaskName::GraspLift || (seen.follow >= HELD_FOLLOW && seen.slip_mm < HELD_SLIP_MM))
+    let (program, row) = (episode.program(), seen(episode));
+    let sight = Sight { row: &row, rows: &[], constants: &program.constants };
+    let mut stages = program.stages.iter().filter(|stage| LIFTED.contains(&stage.name.as_str()));
+    stages.all(|stage| {
+        let now: &Condition = if let Condition::Lasts { what, .. } = &stage.when { what } else { &stage.when };
+        sight.holds(now, &mut Memory::new(stage.timers, stage.marks))
+    })
 }
 
 /// Whether what the arm at place `k` holds hangs on nothing that is pinned.

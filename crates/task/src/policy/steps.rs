@@ -1,9 +1,11 @@
 //! The baseline of a task of one's own: the steps of its `[[task.script]]`, one after the other.
 //!
 //! Like the scripted controller it looks at where the tissue is, which no policy that is scored
-//! may, and all it does goes through actions.
+//! may, closes the jaws as far as the tissue gives ([`Grip`]), and all it does goes through actions.
+//! An arm that loses what its last step `grasp` took, goes back to that step.
 
-use super::aim::{self, Place, eased};
+use super::aim::{self, Manner, Place, eased};
+use super::grip::Grip;
 use super::scripted::{Scripted, Style};
 use super::{CHUNK, Policy};
 use crate::judge::{Memory, Sight};
@@ -16,8 +18,6 @@ use trocar_scene::{ScriptAction, ScriptProgram};
 
 /// Way along the shaft from which open jaws come and to which they draw back (m).
 const BACK: f64 = 0.025;
-/// Tissue is taken this far from the pivot (m): in the middle of the jaws.
-const DEPTH: f64 = 0.0115;
 /// Speed of the tips on the way, at tissue, and with tissue in the jaws (m/s).
 const FAST: f64 = 0.04;
 const SLOW: f64 = 0.025;
@@ -52,7 +52,12 @@ struct Steps {
     to: Vec<Setpoint>,
     last: Vec<Setpoint>,
     until: Memory,
-    tries: usize,
+    /// How each arm closes and comes, and how often it has tried in its last step `grasp`.
+    grips: Vec<Grip>,
+    manners: Vec<Manner>,
+    tries: Vec<usize>,
+    /// The step with which each arm took hold of what it is to hold.
+    held: Vec<Option<usize>>,
 }
 
 impl Steps {
@@ -60,6 +65,8 @@ impl Steps {
         let mut made = Self::default();
         let arms = episode.cell().arms();
         made.last = arms.iter().map(|(side, _)| Ok(episode.cell().setpoint(side.name())?)).collect::<Result<_>>()?;
+        (made.grips, made.manners) = (vec![Grip::default(); arms.len()], vec![Manner::Fitting; arms.len()]);
+        (made.tries, made.held) = (vec![0; arms.len()], vec![None; arms.len()]);
         made.enter_step(episode)?;
         Ok(made)
     }
@@ -80,15 +87,19 @@ impl Steps {
             return Ok(());
         };
         self.until = Memory::new(step.timers, step.marks);
-        self.enter(
-            episode,
-            match step.action {
-                ScriptAction::Grasp(_) => Phase::Approach,
-                ScriptAction::Move(_) => Phase::Move,
-                ScriptAction::Release => Phase::Open,
-                ScriptAction::Wait => Phase::Wait,
-            },
-        )
+        let phase = match step.action {
+            ScriptAction::Grasp(_) => {
+                let k = Self::arm(episode, step)?;
+                if self.held[k] != Some(self.step) {
+                    (self.grips[k], self.manners[k], self.tries[k]) = (Grip::default(), Manner::Fitting, 0);
+                }
+                Phase::Approach
+            }
+            ScriptAction::Move(_) => Phase::Move,
+            ScriptAction::Release => Phase::Open,
+            ScriptAction::Wait => Phase::Wait,
+        };
+        self.enter(episode, phase)
     }
 
     fn enter(&mut self, episode: &Episode, phase: Phase) -> Result<()> {
@@ -106,8 +117,8 @@ impl Steps {
             (Phase::Approach | Phase::Enter, ScriptAction::Grasp(part)) => {
                 let body = bodies_of(cell, &part.organ).first().copied();
                 let body = body.ok_or_else(|| Error::Option(format!("the scene has no organ '{}'", part.organ)))?;
-                let open =
-                    aim::grasp(cell, name, body, Place::InRange(part.range, 0.0), DEPTH, 0.0)?.setpoint.with_jaw(1.0);
+                let place = Place::InRange(part.range, 0.0);
+                let open = aim::grasp(cell, name, body, (place, self.manners[k]), 0.0)?.setpoint;
                 let near = phase == Phase::Enter;
                 self.to[k] = if near { open } else { cell.workspace(name)?.behind(&open, BACK) };
                 way(&self.from[k], &self.to[k], if near { SLOW } else { FAST })?
@@ -115,6 +126,7 @@ impl Steps {
             (Phase::Close, _) => {
                 self.to[k] = self.to[k].with_jaw(0.0);
                 self.from[k] = self.from[k].with_jaw(0.0);
+                self.grips[k].begin();
                 CLOSE_S
             }
             (Phase::Move, ScriptAction::Move(by)) => {
@@ -145,20 +157,58 @@ impl Steps {
     /// Goes on to what comes after the phase.
     fn next(&mut self, episode: &Episode) -> Result<()> {
         let Some(step) = self.script(episode) else { return Ok(()) };
-        let held = holds(episode, step)?;
+        let k = Self::arm(episode, step)?;
         match self.phase {
             Some(Phase::Approach) => self.enter(episode, Phase::Enter),
             Some(Phase::Enter) => self.enter(episode, Phase::Close),
-            Some(Phase::Close) if !held && self.tries < TRIES => {
-                self.tries += 1;
+            Some(Phase::Close) if !holds(episode, step)? && self.tries[k] < TRIES => {
+                self.tries[k] += 1;
+                let disabled = episode.cell().disabled_contact(step.arm.name())?.0;
+                self.grips[k].missed(disabled);
+                if disabled {
+                    // There is no room for the blades beside the tissue.
+                    self.manners[k] = Manner::Pinching;
+                }
                 self.enter(episode, Phase::Approach)
             }
             Some(Phase::Open) => self.enter(episode, Phase::Withdraw),
-            _ => {
-                (self.step, self.tries) = (self.step + 1, 0);
+            phase => {
+                match phase {
+                    Some(Phase::Close) => self.held[k] = Some(self.step),
+                    Some(Phase::Withdraw) => self.held[k] = None,
+                    _ => {}
+                }
+                self.step += 1;
+                self.skip_held(episode)?;
                 self.enter_step(episode)
             }
         }
+    }
+
+    /// Goes over steps that take hold of what is held already, which is so where an arm that lost
+    /// its tissue has gone back.
+    fn skip_held(&mut self, episode: &Episode) -> Result<()> {
+        while let Some(step) = self.script(episode) {
+            let k = Self::arm(episode, step)?;
+            if self.held[k] != Some(self.step) || !holds(episode, step)? {
+                break;
+            }
+            self.step += 1;
+        }
+        Ok(())
+    }
+
+    /// The first arm that has lost what it took hold of and may try again, with the step that took
+    /// it.
+    fn lost(&self, episode: &Episode) -> Result<Option<(usize, usize)>> {
+        for (k, held) in self.held.iter().enumerate() {
+            let Some(at) = *held else { continue };
+            let Some(step) = episode.program().script.get(at) else { continue };
+            if self.tries[k] < TRIES && !holds(episode, step)? {
+                return Ok(Some((k, at)));
+            }
+        }
+        Ok(None)
     }
 
     /// The phase is over, by its time or by what is seen.
@@ -179,11 +229,27 @@ impl Steps {
     }
 
     fn act(&mut self, episode: &Episode) -> Result<Vec<Action>> {
+        if matches!(self.phase, Some(Phase::Move | Phase::Wait) | None)
+            && let Some((k, at)) = self.lost(episode)?
+        {
+            self.tries[k] += 1;
+            self.grips[k].slipped();
+            self.step = at;
+            self.enter_step(episode)?;
+        }
         while self.phase.is_some() && self.over(episode)? {
             self.next(episode)?;
         }
-        // What ends a step is looked at in every period; a motion goes on in chunks.
-        let looks = self.script(episode).is_some_and(|s| s.until.is_some());
+        let step = self.script(episode);
+        // What ends a step, and what closing jaws feel, is looked at in every period; a motion goes
+        // on in chunks.
+        let closing = self.phase == Some(Phase::Close);
+        let looks = closing || step.is_some_and(|s| s.until.is_some());
+        if let (Some(step), true) = (step, closing) {
+            let k = Self::arm(episode, step)?;
+            let arm = &episode.cell().observe()[k];
+            self.to[k] = self.to[k].with_jaw(self.grips[k].opening(arm.measured.jaw(), arm.jaw_force));
+        }
         let most = if looks || self.phase.is_none() { 1 } else { CHUNK };
         let mut chunk = Vec::with_capacity(most);
         while chunk.len() < most {
