@@ -9,10 +9,10 @@
         --policy pictures_0=python:cloned/policies.py:pictures_0
 
 The policy observes one endoscope picture of 84 x 84 pixels and what a robot measures of its left
-arm: coordinates, rates, tip, force, and whether the jaws hold tissue. It does not get the stage.
-With `--observe states` it does not get the picture either: the same network, blind. It predicts the
-targets of the left arm for the next 0.8 s, of which the first 8 are executed before it is asked
-again. The right arm stays where it starts.
+arm: coordinates, rates, tip, force, whether the jaws hold tissue, and how far the tip has risen
+since they do. It does not get the stage. With `--observe states` it does not get the picture
+either: the same network, blind. It predicts the targets of the left arm for the next 0.8 s, of
+which the first 4 are executed before it is asked again. The right arm stays where it starts.
 
 Of the demonstrations, the last tenth is held out for the curve. Nothing is pretrained.
 """
@@ -31,10 +31,14 @@ from torch import nn
 #: The observed numbers of a state: coordinates, rates and tip of the left arm, its force, and
 #: whether its jaws hold tissue.
 OBSERVED = [*range(13), 18, 19, 20, 22]
+#: Where a state says whether the left jaws hold tissue, and the height of the left tip (m).
+HOLDS, HEIGHT = 22, 12
+#: Length of what the network gets besides the picture: these and the rise.
+NUMBERS = len(OBSERVED) + 1
 #: Targets of the left arm in an action, and the arms' coordinates in a state.
 LEFT, RIGHT = slice(0, 5), slice(23, 28)
 #: Predicted steps of 1/30 s, and how many of them are executed.
-HORIZON, EXECUTED = 24, 8
+HORIZON, EXECUTED = 24, 4
 #: Pictures are shifted by up to this in training (px), as by other poses of the camera.
 SHIFT = 4
 #: Share of the episodes that are held out.
@@ -44,7 +48,7 @@ ROWS = 25
 
 
 class Net(nn.Module):
-    """Targets (n, HORIZON, 5) from pictures (n, 3, height, width) and numbers (n, OBSERVED).
+    """Targets (n, HORIZON, 5) from pictures (n, 3, height, width) and numbers (n, NUMBERS).
 
     The pictures become places: the mean position of each of 48 feature maps (Levine et al. 2016).
     The first four targets are differences to the present coordinates; the jaw is absolute. All are
@@ -64,13 +68,13 @@ class Net(nn.Module):
                 nn.Conv2d(32, places, 3, padding=1),
             )
         self.head = nn.Sequential(
-            nn.Linear(2 * places + len(OBSERVED), 256),
+            nn.Linear(2 * places + NUMBERS, 256),
             nn.ReLU(),
             nn.Linear(256, 256),
             nn.ReLU(),
             nn.Linear(256, 5 * HORIZON),
         )
-        for name, count in [("mean", len(OBSERVED)), ("deviation", len(OBSERVED)), ("scale", 5)]:
+        for name, count in [("mean", NUMBERS), ("deviation", NUMBERS), ("scale", 5)]:
             self.register_buffer(name, torch.ones(count))
 
     def forward(self, pictures: torch.Tensor | None, numbers: torch.Tensor) -> torch.Tensor:
@@ -83,6 +87,22 @@ class Net(nn.Module):
             places = [(weights.sum(3) * rows).sum(-1), (weights.sum(2) * columns).sum(-1)]
             seen = torch.cat([*places, seen], -1)
         return self.head(seen).view(-1, HORIZON, 5)
+
+
+class Rise:
+    """How far the left tip has risen since its jaws hold tissue (m), 0 while they do not."""
+
+    def __init__(self) -> None:
+        self.held_from: float | None = None
+
+    def numbers(self, state: np.ndarray) -> np.ndarray:
+        """What the network gets of a state, one after the other of an episode."""
+        if not state[HOLDS]:
+            self.held_from = None
+        elif self.held_from is None:
+            self.held_from = float(state[HEIGHT])
+        rise = 0.0 if self.held_from is None else state[HEIGHT] - self.held_from
+        return np.append(state[OBSERVED], np.float32(rise))
 
 
 class Demonstrations:
@@ -99,11 +119,14 @@ class Demonstrations:
         state = np.stack(table["observation.state"].to_numpy()).astype(np.float32)
         action = np.stack(table["action"].to_numpy()).astype(np.float32)
         episode = table["episode_index"].to_numpy()
-        self.numbers = torch.from_numpy(state[:, OBSERVED])
-        # The last target of an episode stands for those after its end.
+        rises = [Rise() for _ in range(episode[-1] + 1)]
+        numbers = [rises[k].numbers(one) for k, one in zip(episode, state)]
+        self.numbers = torch.from_numpy(np.stack(numbers))
+        # What comes after the end of an episode does not count.
         last = np.searchsorted(episode, episode, side="right") - 1
-        ahead = np.minimum(np.arange(len(table))[:, None] + np.arange(HORIZON), last[:, None])
-        targets = action[ahead][..., LEFT]
+        ahead = np.arange(len(table))[:, None] + np.arange(HORIZON)
+        self.counts = torch.from_numpy(ahead <= last[:, None])
+        targets = action[np.minimum(ahead, last[:, None])][..., LEFT]
         targets[..., :4] -= state[:, None, :4]
         self.targets = torch.from_numpy(targets)
         count = int(episode[-1]) + 1
@@ -124,8 +147,11 @@ class Demonstrations:
 
     def batch(
         self, rows: np.ndarray, dice: np.random.Generator | None
-    ) -> tuple[torch.Tensor | None, torch.Tensor, torch.Tensor]:
-        """Pictures, numbers and targets of `rows`. With `dice` each picture is shifted."""
+    ) -> tuple[torch.Tensor | None, torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Pictures, numbers and targets of `rows`, and which targets count.
+
+        With `dice` each picture is shifted.
+        """
         pictures = None if self.pictures is None else self.pictures[rows]
         if pictures is not None and dice is not None:
             height, width = pictures.shape[2:]
@@ -137,12 +163,18 @@ class Demonstrations:
                     for one, (down, right) in zip(wide, corners)
                 ]
             )
-        return pictures, self.numbers[rows], self.targets[rows]
+        return pictures, self.numbers[rows], self.targets[rows], self.counts[rows]
 
 
-def loss_of(net: Net, pictures: Any, numbers: torch.Tensor, targets: torch.Tensor) -> torch.Tensor:
+def loss_of(
+    net: Net,
+    pictures: torch.Tensor | None,
+    numbers: torch.Tensor,
+    targets: torch.Tensor,
+    counts: torch.Tensor,
+) -> torch.Tensor:
     """The mean absolute error in units of the targets' deviations."""
-    return (net(pictures, numbers) - targets / net.scale).abs().mean()
+    return (net(pictures, numbers) - targets / net.scale)[counts].abs().mean()
 
 
 def train(
@@ -189,14 +221,15 @@ class Cloned:
         saved = torch.load(weights, weights_only=True)
         self.net = Net(saved["observe"])
         self.net.load_state_dict(saved["net"])
-        self.right: np.ndarray | None = None
+        self.reset()
 
     def reset(self) -> None:
         """Starts an episode."""
-        self.right = None
+        self.right: np.ndarray | None = None
+        self.rise = Rise()
 
     def infer(self, obs: dict[str, Any]) -> dict[str, Any]:
-        """A chunk (8, 10) of absolute targets."""
+        """A chunk (4, 10) of absolute targets."""
         state = np.asarray(obs["observation/state"], np.float32)
         if self.right is None:
             self.right = state[RIGHT].copy()
@@ -205,7 +238,7 @@ class Cloned:
             seen = np.array(obs["observation/images/endoscope"])
             picture = torch.from_numpy(seen).permute(2, 0, 1)[None]
         with torch.no_grad():
-            numbers = torch.from_numpy(state[OBSERVED])[None]
+            numbers = torch.from_numpy(self.rise.numbers(state))[None]
             targets = self.net(picture, numbers)[0] * self.net.scale
         chunk = np.tile(np.concatenate([np.zeros(5), self.right]), (EXECUTED, 1))
         chunk[:, LEFT] = targets[:EXECUTED].numpy()

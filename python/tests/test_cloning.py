@@ -84,11 +84,19 @@ def test_the_same_seed_gives_the_same_weights(example, dataset, cloned):
     assert all(torch.equal(kept[name], value) for name, value in net.state_dict().items())
 
 
-def test_targets_stop_at_the_end_of_an_episode(example, dataset):
+def test_targets_after_the_end_of_an_episode_do_not_count(example, dataset):
     data = example.Demonstrations(dataset, "states")
-    last = data.train[-1]
-    shown = data.targets[last]
-    assert torch.equal(shown, shown[:1].expand_as(shown))
+    assert data.counts[data.train[-1]].tolist() == [True] + [False] * (example.HORIZON - 1)
+    assert data.counts[data.train[0]].all()
+
+
+def test_the_rise_begins_where_the_jaws_take_hold(example):
+    rise, state = example.Rise(), np.zeros(47, np.float32)
+    heights = []
+    for holds, height in [(0, 1.0), (1, 2.0), (1, 2.5), (0, 2.5), (1, 3.0), (1, 3.25)]:
+        state[example.HOLDS], state[example.HEIGHT] = holds, height
+        heights.append(float(rise.numbers(state)[-1]))
+    assert heights == [0.0, 0.0, 0.5, 0.0, 0.0, 0.25]
 
 
 def test_a_cloned_policy_runs_in_a_campaign(cloned, tmp_path):
