@@ -25,7 +25,7 @@ const SPECIMEN_SOURCES: [&str; 9] = [
 
 /// What an episode depends on: crates, the observations of remote policies, and the versions of all
 /// dependencies.
-const EPISODE_SOURCES: [&str; 14] = [
+const EPISODE_SOURCES: [&str; 15] = [
     "camera/src",
     "cell/src",
     "core/src",
@@ -37,6 +37,7 @@ const EPISODE_SOURCES: [&str; 14] = [
     "sensors/src",
     "specimen/src",
     "task/src",
+    "sparse/src",
     "tissue/src",
     "campaign/src/remote.rs",
     "../Cargo.lock",

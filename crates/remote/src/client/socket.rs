@@ -119,15 +119,9 @@ impl Socket {
     /// error.
     pub fn read_pending(&mut self) -> Result<()> {
         let wait = Wait::new("a request", Duration::from_millis(1));
-        let end = Instant::now() + MAX_PENDING_READ;
-        self.control.at_once(end);
+        self.control.at_once(Instant::now() + MAX_PENDING_READ);
         loop {
-            let read = self.web.read();
-            if Instant::now() >= end {
-                let reason = "the server sends without a pause".into();
-                return Err(Error::Protocol { url: self.url.clone(), reason });
-            }
-            match read {
+            match self.web.read() {
                 Ok(Message::Ping(_) | Message::Pong(_) | Message::Frame(_)) => {}
                 Ok(Message::Close(frame)) => return Err(closed(&self.url, wait.what, frame.as_ref())),
                 Ok(Message::Text(text)) => return Err(server_error(&self.url, text.as_str())),
@@ -136,7 +130,14 @@ impl Socket {
                     return Err(Error::Protocol { url: self.url.clone(), reason });
                 }
                 Err(tungstenite::Error::Io(e)) if e.kind() == std::io::ErrorKind::WouldBlock => return Ok(()),
-                Err(e) => return Err(failure(e, &self.url, self.limit, wait)),
+                Err(e) => {
+                    return Err(match failure(e, &self.url, self.limit, wait) {
+                        Error::TimedOut { url, .. } => {
+                            Error::Protocol { url, reason: "the server sends without a pause".into() }
+                        }
+                        other => other,
+                    });
+                }
             }
         }
     }

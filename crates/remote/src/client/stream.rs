@@ -40,8 +40,9 @@ impl Control {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Limit::Until(deadline);
     }
 
-    /// Later operations return [`io::ErrorKind::WouldBlock`] instead of waiting, and end at
-    /// `deadline` if there is always data.
+    /// Later operations return [`io::ErrorKind::WouldBlock`] instead of waiting, and fail if there
+    /// is still data after `deadline`. A thread that was kept waiting until then may still learn
+    /// that there is none.
     pub fn at_once(&self, deadline: Instant) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Limit::AtOnce(deadline);
     }
@@ -72,8 +73,7 @@ impl Timed {
             let limit = self.control.now();
             // Checked even if there is always data.
             let left = match limit {
-                Limit::AtOnce(deadline) if Instant::now() < deadline => Duration::from_millis(1),
-                Limit::AtOnce(_) => Duration::ZERO,
+                Limit::AtOnce(_) => Duration::from_millis(1),
                 Limit::Until(_) if self.interrupt.as_ref().is_some_and(|f| f.load(Ordering::Relaxed)) => {
                     return Err(io::Error::other(Halt::Interrupted));
                 }
@@ -90,7 +90,12 @@ impl Timed {
                         return Err(io::ErrorKind::WouldBlock.into());
                     }
                 }
-                done => return done,
+                done => {
+                    return match limit {
+                        Limit::AtOnce(end) if Instant::now() >= end => Err(io::Error::other(Halt::TimedOut)),
+                        _ => done,
+                    };
+                }
             }
         }
     }
