@@ -80,10 +80,10 @@ pub enum Error {
     Geometry(#[from] trocar_geometry::Error),
     /// A phantom cannot be recorded.
     #[error(transparent)]
-    Phantom(#[from] trocar_phantom::Error),
+    Phantom(trocar_phantom::Error),
     /// A recording or surface cannot be reconstructed.
     #[error(transparent)]
-    Reconstruct(#[from] trocar_reconstruct::Error),
+    Reconstruct(trocar_reconstruct::Error),
     /// A recording is unusable.
     #[error(transparent)]
     Recording(#[from] trocar_recording::Error),
@@ -125,6 +125,26 @@ pub fn check_interrupted(progress: &dyn Progress) -> Result<()> {
 }
 
 /// Keeps interruptions apart from other errors.
+impl From<trocar_phantom::Error> for Error {
+    fn from(error: trocar_phantom::Error) -> Self {
+        match error {
+            trocar_phantom::Error::Interrupted => Self::Interrupted,
+            other => Self::Phantom(other),
+        }
+    }
+}
+
+/// Keeps interruptions apart from other errors.
+impl From<trocar_reconstruct::Error> for Error {
+    fn from(error: trocar_reconstruct::Error) -> Self {
+        match error {
+            trocar_reconstruct::Error::Interrupted => Self::Interrupted,
+            other => Self::Reconstruct(other),
+        }
+    }
+}
+
+/// Keeps interruptions apart from other errors.
 impl From<trocar_cell::Error> for Error {
     fn from(error: trocar_cell::Error) -> Self {
         match error {
@@ -139,6 +159,22 @@ impl From<trocar_task::Error> for Error {
         match error {
             trocar_task::Error::Cell(inner) => inner.into(),
             other => Self::Task(other),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn interruptions_are_one_error_wherever_the_work_stopped() {
+        for error in [
+            Error::from(trocar_phantom::Error::Interrupted),
+            Error::from(trocar_reconstruct::Error::Interrupted),
+            Error::from(trocar_cell::Error::Interrupted),
+        ] {
+            assert!(matches!(error, Error::Interrupted), "{error:?}");
         }
     }
 }
