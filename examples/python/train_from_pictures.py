@@ -33,7 +33,7 @@ from torch import nn
 OBSERVED = [*range(13), 18, 19, 20, 22]
 #: Where a state says whether the left jaws hold tissue, and the height of the left tip (m).
 HOLDS, HEIGHT = 22, 12
-#: Length of what the network gets besides the picture: these and the rise.
+#: How many numbers the network gets besides the picture: those observed, and the rise.
 NUMBERS = len(OBSERVED) + 1
 #: Targets of the left arm in an action, and the arms' coordinates in a state.
 LEFT, RIGHT = slice(0, 5), slice(23, 28)
@@ -300,7 +300,7 @@ def main() -> None:
     parser.add_argument("--observe", default="pictures", choices=["pictures", "states"])
     parser.add_argument("--name", help="of the policies (default: what they observe)")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2])
-    parser.add_argument("--steps", type=int, default=1500)
+    parser.add_argument("--steps", type=int, default=700)
     parser.add_argument("--batch", type=int, default=64)
     parser.add_argument("--episodes", type=int, help="use this many (default: all)")
     parser.add_argument("--threads", type=int, default=2)

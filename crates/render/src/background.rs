@@ -1,7 +1,7 @@
 //! What previews through one camera have in common: bodies at rest, and their light.
 //!
-//! Cameras of a cell stand still, and so does most of what they see. Bodies that have rested for a
-//! while are drawn and lit once for a camera. Later pictures start with them.
+//! The cameras of a cell do not move, and most of what they see does not move either. Bodies that
+//! have rested for a while are drawn and lit once for a camera. Later pictures start with them.
 
 use crate::film::Film;
 use crate::light::Light;

@@ -1,7 +1,7 @@
 //! The two types of numbers that a factor may have.
 
 use fearless_simd::{Simd, SimdBase, f32x16, f64x8};
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Sub};
 
 /// A floating-point number: `f32` or `f64`.
 pub trait Real:
@@ -14,7 +14,6 @@ pub trait Real:
     + Sub<Output = Self>
     + Mul<Output = Self>
     + Div<Output = Self>
-    + Neg<Output = Self>
     + 'static
 {
     /// Numbers in a vector of 64 bytes: rows of a tile.

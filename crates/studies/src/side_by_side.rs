@@ -4,8 +4,8 @@ use crate::{Error, Result};
 use rayon::prelude::*;
 use trocar_core::{Progress, Quiet};
 
-/// Calls `run` for every index below `count` on `threads` threads (0: all). `finished` counts earlier
-/// trials in the progress.
+/// Calls `run` for every index below `count` on `threads` threads (0: all). The progress starts at
+/// the `finished` trials of earlier runs.
 pub(crate) fn side_by_side(
     stage: &str,
     count: usize,

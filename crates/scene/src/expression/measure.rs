@@ -45,8 +45,8 @@ pub enum Measure {
     Aside(Target),
     /// Rise since the episode's start (mm).
     Risen(Target),
-    /// Share of what a camera would see of a part of an organ if nothing hid it, that it sees: 0 to
-    /// 1.
+    /// Visible share of a part of an organ, 0 to 1: the pixels that a camera sees of it, over those
+    /// that it would see if nothing hid the part.
     Visible(String, Part),
 }
 

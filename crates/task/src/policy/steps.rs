@@ -56,7 +56,7 @@ struct Steps {
     grips: Vec<Grip>,
     manners: Vec<Manner>,
     tries: Vec<usize>,
-    /// The step with which each arm took hold of what it is to hold.
+    /// The step in which each arm grasped the tissue that it holds.
     held: Vec<Option<usize>>,
 }
 
@@ -185,8 +185,8 @@ impl Steps {
         }
     }
 
-    /// Goes over steps that take hold of what is held already, which is so where an arm that lost
-    /// its tissue has gone back.
+    /// Skips grasps of tissue that is held already. They occur after an arm that lost its tissue has
+    /// gone back to its own grasp.
     fn skip_held(&mut self, episode: &Episode) -> Result<()> {
         while let Some(step) = self.script(episode) {
             let k = Self::arm(episode, step)?;
