@@ -206,7 +206,7 @@ impl Scene {
         let mut scene = self.clone();
         scene.description.clear();
         if let Some(Source::Folder(_)) = self.specimen.source() {
-            scene.specimen = SpecimenSource { path: Some(String::new()), phantom: None, seed: 0 };
+            scene.specimen = SpecimenSource { seed: 0, ..SpecimenSource::folder("") };
         }
         let mut hash = Xxh3::new();
         hash.update(scene.to_toml()?.as_bytes());

@@ -1,7 +1,7 @@
 //! Checks of the specimen, the settings of its organs, and their tissue.
 
 use super::{Checked, Problem, join, name, number, numbers, one_of, point, problem, quaternion};
-use crate::{FIELD, MaterialOverride, PHANTOMS, PinEnd, PinRule, Scene, Source};
+use crate::{FIELD, MaterialOverride, PHANTOMS, PinEnd, PinRule, Scene, Source, SpecimenSource};
 use trocar_specimen::{End, Material};
 
 pub(super) fn check(scene: &Scene) -> Checked {
@@ -40,6 +40,15 @@ fn specimen(scene: &Scene) -> Checked {
             return Err(problem("specimen", " has neither a path nor a phantom; it must have one of them".into()));
         }
         _ => {}
+    }
+    if let Some(most) = given.max_elements {
+        if given.path.is_some() {
+            let reason = " is for phantoms; the folder of specimen.path has its meshes";
+            return Err(problem("specimen.max_elements", reason.into()));
+        }
+        let range = SpecimenSource::MAX_ELEMENTS;
+        let range = f64::from(*range.start())..=f64::from(*range.end());
+        number("specimen.max_elements", f64::from(most), &range)?;
     }
     match given.source() {
         Some(Source::Phantom(name, _)) => {
