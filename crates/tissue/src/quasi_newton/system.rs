@@ -140,6 +140,12 @@ impl System {
         });
     }
 
+    /// The stiffness of the springs of a node in the matrix: those in the factor, and what the update
+    /// adds or takes (N/m).
+    pub fn spring(&self, i: usize) -> f32 {
+        self.holding(i) + self.update.added(i as u32)
+    }
+
     /// The stiffness that holds a held node (N/m).
     pub fn holding(&self, i: usize) -> f32 {
         self.factor.as_ref().map_or(0.0, |factor| factor.holding[i])
