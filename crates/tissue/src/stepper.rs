@@ -174,11 +174,14 @@ impl Stepper {
 
     /// How the force of tissue on `tools` changes when they move together, as one rigid body: about
     /// the point `about` (m), the wrench on them (N, N m) changes by minus this matrix times the
-    /// motion (translation (m), rotation vector (rad)) of a frame. It is linearised at the end of the
-    /// last frame, which left `state`; masses and dashpots resist the motion, so tissue at rest is
-    /// softer. Left out are the turn of present forces with the tools, and rigid grasps. Symmetric, positive semidefinite
-    /// up to rounding. It costs six solves a substep for each body that is touched. The next frame
-    /// has the same bits with and without it.
+    /// motion (translation (m), rotation vector (rad)) of a frame.
+    ///
+    /// It is linearised at the end of the last frame, which left `state`, with elements as stiff as
+    /// at rest. Masses and dashpots resist the motion: tissue that settles is softer. Left out are
+    /// rigid grasps, and how present forces turn with the tools. It is symmetric, and positive
+    /// semidefinite up to rounding. The cost is six solves a substep for each body that is touched,
+    /// and some ten times as many where tissue slips along the tools. The next frame has the same
+    /// bits with and without it.
     ///
     /// Zero with solvers other than [`SolverSettings::QuasiNewton`], which have no matrix.
     pub fn tool_stiffness(&mut self, model: &Model, state: &State, tools: &[usize], about: DVec3) -> [[f64; 6]; 6] {

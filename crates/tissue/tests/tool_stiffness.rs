@@ -122,7 +122,8 @@ fn stiffness_of_a_contact_is_the_derivative_of_its_force() {
     let ball = Pose { translation: DVec3::new(10e-3, 10e-3, 12.5e-3), ..Pose::IDENTITY };
     for young_modulus in [3e3, 48e3] {
         let pressed = compare("ball", young_modulus, None, [AWAY, ball], 3);
-        assert!(pressed < 0.1, "{pressed}");
+        // The ball is 1.5 mm deep in a layer of 10 mm; the stiffness is that of tissue at rest.
+        assert!(pressed < 0.2, "{pressed}");
     }
 }
 
