@@ -96,10 +96,7 @@ impl Factor {
     /// Whether it changes pictures and nothing else.
     pub fn is_of_pictures(self) -> bool {
         use Factor::{CameraShift, CameraTurn, ExposureScale, FocalScale, GlossScale, LampScale, NoiseScale, Tint};
-        match self {
-            CameraShift | CameraTurn | FocalScale => true,
-            LampScale | ExposureScale | NoiseScale | GlossScale | Tint => true,
-            _ => false,
-        }
+        let of_cameras = matches!(self, CameraShift | CameraTurn | FocalScale);
+        of_cameras || matches!(self, LampScale | ExposureScale | NoiseScale | GlossScale | Tint)
     }
 }
