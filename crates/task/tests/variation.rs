@@ -99,7 +99,7 @@ fn a_drawn_delay_is_in_the_cell_and_in_the_episode_file() {
     let written: Scene = trocar_specimen::parse_toml(&one.file.header.scene).unwrap();
     assert!(one.file.verify(&written, &specimen, 2, &mut || true).unwrap().same);
     // With another delay the same actions give another episode.
-    let mut file = one.file.clone();
+    let mut file = one.file;
     file.header.drawn = file.header.drawn.replace(&first.to_string(), &second.to_string());
     let verdict = file.verify(&written, &specimen, 1, &mut || true).unwrap();
     assert!(!verdict.same && verdict.first_difference.is_some_and(|k| k > 0), "{verdict:?}");
