@@ -50,6 +50,18 @@ fn specimen(scene: &Scene) -> Checked {
         let range = f64::from(*range.start())..=f64::from(*range.end());
         number("specimen.max_elements", f64::from(most), &range)?;
     }
+    for (organ, other) in &given.swapped {
+        let at = format!("specimen.swapped.{organ}");
+        match SpecimenSource::labelled(other).source() {
+            Some(Source::Folder(path)) if !scene.resolve(path).join("specimen.toml").is_file() => {
+                let shown: String = other.chars().take(200).flat_map(char::escape_default).collect();
+                let reason =
+                    format!(" is '{shown}'; it must be a specimen folder, or a phantom with its seed, as phantom-a:7");
+                return Err(problem(at, reason));
+            }
+            _ => {}
+        }
+    }
     match given.source() {
         Some(Source::Phantom(name, _)) => {
             one_of("specimen.phantom", name, "the phantoms are", &PHANTOMS.map(|p| p.name))
@@ -104,6 +116,13 @@ pub(crate) fn check_organs(scene: &Scene, organs: &[String]) -> Checked {
     for organ in scene.organs.keys() {
         one_of(&format!("organ.{organ}"), organ, "the specimen's organs are", &known)
             .map_err(|p| problem(p.field, p.reason.replacen(" is ", " names ", 1)))?;
+    }
+    for organ in scene.specimen.swapped.keys() {
+        one_of(&format!("specimen.swapped.{organ}"), organ, "the specimen's organs are", &known)
+            .map_err(|p| problem(p.field, p.reason.replacen(" is ", " names ", 1)))?;
+    }
+    for (k, organ) in scene.variation.swapped.iter().enumerate() {
+        one_of(&format!("variation.swapped[{k}]"), organ, "the specimen's organs are", &known)?;
     }
     let mut touching = known.clone();
     touching.push(FIELD);
