@@ -9,17 +9,23 @@
 mod arm;
 mod camera;
 mod cell_stage;
+mod drawn;
 mod error;
 mod field;
 mod furniture;
 mod instrument;
+mod looks;
 mod organ;
+mod organ_in_cell;
 mod rig;
 mod section;
 mod solid;
+mod surroundings;
 mod visuals;
 
-pub use camera::OUTSIDE;
+pub use camera::{OUTSIDE, image_circle};
+pub use drawn::{DrawnBody, DrawnCell, DrawnMesh, DrawnOrgan, DrawnPart};
 pub use error::{Error, Result};
+pub use organ::BoundSurface;
 pub use rig::{CameraRig, PICTURE_SIDES, SensorNoise};
 pub use trocar_camera::DepthNoise;

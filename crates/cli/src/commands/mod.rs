@@ -13,6 +13,7 @@ mod simulate;
 mod specimens;
 mod study;
 mod task;
+mod view;
 
 use crate::cli::{Cli, Command};
 use trocar_core::Progress;
@@ -37,6 +38,7 @@ pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
         Command::Task(arguments) => task::run(arguments, cli.json)?,
         Command::Specimens(arguments) => specimens::run(arguments, cli.json, progress)?,
         Command::Segment(arguments) => segment::run(arguments, cli.json, progress)?,
+        Command::View(arguments) => view::run(arguments, cli.json, progress)?,
         Command::Simulate(arguments) => simulate::run(arguments, cli.json, progress)?,
     }
     Ok(())
