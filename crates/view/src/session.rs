@@ -285,8 +285,11 @@ impl Session {
                 return Ok(None);
             }
             Wish::Table => {
-                let folder = self.folder().ok_or_else(no_table)?;
-                return Ok(Some(Outgoing::text(&folder.message(number, self.open.as_deref()))));
+                let table = match self.folder() {
+                    Some(folder) => folder.message(number, self.open.as_deref()),
+                    None => json!({"type": "table", "request": number, "kind": "none", "name": "", "episodes": []}),
+                };
+                return Ok(Some(Outgoing::text(&table)));
             }
             Wish::Refresh => self.stale = true,
             Wish::Lost(arm) => self.lost(arm),
