@@ -2,6 +2,7 @@
 
 mod episode;
 mod evaluate;
+mod export;
 mod render;
 mod scene;
 mod specimens;
@@ -11,6 +12,7 @@ mod view;
 
 pub use episode::*;
 pub use evaluate::*;
+pub use export::*;
 pub use render::*;
 pub use scene::*;
 pub use specimens::*;
@@ -77,6 +79,9 @@ pub enum Command {
     Replay(Replay),
     /// Score stored episodes at other gates, without simulation.
     Sweep(Sweep),
+    /// Write recorded episodes as a dataset of LeRobot or robomimic, rendered now and without
+    /// simulation.
+    Export(Export),
     /// Watch a scene, specimen, episode or campaign in the browser while it runs, and take the
     /// instruments in hand.
     View(View),

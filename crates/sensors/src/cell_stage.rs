@@ -2,12 +2,13 @@
 
 use crate::instrument::Shapes;
 use crate::looks::{glossed, housing, polished, shell, wet};
-use crate::organ_in_cell::OrganInCell;
 use crate::section::section;
+use crate::skins::{ArmPosture, Skins};
 use crate::surroundings::surroundings;
 use crate::{Result, arm};
 use glam::DVec3;
 use std::path::PathBuf;
+use std::sync::Arc;
 use trocar_cell::Cell;
 use trocar_core::Pose;
 use trocar_geometry::TriMesh;
@@ -29,20 +30,18 @@ pub(crate) struct CellStage {
     pub labels: Vec<(u16, String)>,
     /// The stage without the organs.
     base: Stage,
+    skins: Skins,
     organs: Vec<OrganOnStage>,
     arms: Vec<Arm>,
     section: Option<(DVec3, DVec3)>,
     imaging: Imaging,
 }
 
+/// What is on the stage of an organ.
 #[derive(Clone)]
 struct OrganOnStage {
-    organ: OrganInCell,
     label: u16,
     shape: Option<ShapeId>,
-    /// Nodes when the stage was last updated.
-    drawn_nodes: Vec<DVec3>,
-    skin: Vec<DVec3>,
 }
 
 #[derive(Clone)]
@@ -76,6 +75,7 @@ impl CellStage {
             labels: Vec::new(),
             base: Stage::new(),
             stage: Stage::new(),
+            skins: Skins::placed(placed),
             organs: Vec::new(),
             arms: Vec::new(),
             section: None,
@@ -84,8 +84,7 @@ impl CellStage {
         for (k, organ) in placed.organs.iter().enumerate() {
             let label = 1 + k as u16;
             all.labels.push((label, organ.name.clone()));
-            let organ = OrganInCell::new(organ);
-            all.organs.push(OrganOnStage { organ, label, shape: None, drawn_nodes: Vec::new(), skin: Vec::new() });
+            all.organs.push(OrganOnStage { label, shape: None });
         }
         for piece in surroundings(placed, recording, scene)? {
             all.add(piece.name, &piece.mesh, &piece.appearance)?;
@@ -114,14 +113,12 @@ impl CellStage {
         k: usize,
         (scene, arm): (&Scene, &trocar_scene::Arm),
         held: &trocar_scene::Instrument,
-        cell: &Cell,
+        (model, posture): (&str, &ArmPosture),
     ) -> Result<()> {
-        let name = arm.name.name();
-        let poses = cell.link_poses(name)?;
+        let (name, poses) = (arm.name.name(), &posture.links);
         let label = ARMS + k as u16;
         self.labels.push((label, format!("{name} arm")));
         // Arms with the same description share their shapes.
-        let model = cell.arm_model(name)?;
         let drawn = arm.drawn().map(|file| ShapeSource {
             file: scene.resolve(file),
             flange: arm.flange.clone(),
@@ -133,12 +130,12 @@ impl CellStage {
         let shapes = match known {
             Some(shapes) => shapes,
             None => {
-                let meshes = arm::links(scene, arm, model, &poses)?;
+                let meshes = arm::links(scene, arm, model, poses)?;
                 meshes.iter().map(|mesh| self.base.add_shape(mesh)).collect::<std::result::Result<Vec<_>, _>>()?
             }
         };
         let mut links = Vec::new();
-        for (shape, pose) in shapes.iter().zip(&poses) {
+        for (shape, pose) in shapes.iter().zip(poses) {
             links.push(self.base.add_body(*shape, pose, label, &shell())?);
         }
         let held_shapes = Shapes::of(held);
@@ -157,7 +154,7 @@ impl CellStage {
 
     /// Mean position of the organs' nodes at rest (m).
     pub fn organs_middle(&self) -> DVec3 {
-        let all = self.organs.iter().flat_map(|o| &o.organ.recorded.body.vertices);
+        let all = self.skins.organs().iter().flat_map(|o| o.rest());
         let (sum, n) = all.fold((DVec3::ZERO, 0_usize), |(sum, n), p| (sum + *p, n + 1));
         sum / n.max(1) as f64
     }
@@ -180,55 +177,57 @@ impl CellStage {
 
     /// Updates the stage to the current state of the cell.
     pub fn update(&mut self, cell: &Cell) -> Result<()> {
-        let mut same = true;
-        for organ in &mut self.organs {
-            let follows = organ.organ.follow(cell.world())?;
-            same &= follows && organ.shape.is_some();
-        }
-        if same && self.section.is_none() {
-            for organ in &mut self.organs {
-                if organ.organ.nodes == organ.drawn_nodes {
-                    continue;
-                }
-                organ.organ.surface.positions(&organ.organ.nodes, &mut organ.skin);
+        let same = self.skins.update(cell)?;
+        let arms: Vec<ArmPosture> = self.arms.iter().map(|a| ArmPosture::of(cell, a.name)).collect::<Result<_>>()?;
+        self.place(same, &arms)
+    }
+
+    /// Updates the stage to recorded surfaces and arms.
+    pub fn show(
+        &mut self,
+        shown: &[(Arc<TriMesh>, Vec<DVec3>)],
+        other_meshes: bool,
+        arms: &[ArmPosture],
+    ) -> Result<()> {
+        self.skins.show(shown, other_meshes)?;
+        self.place(!other_meshes, arms)
+    }
+
+    /// Puts the surfaces and the arms on the stage. `same`: the meshes are those on it.
+    fn place(&mut self, same: bool, arms: &[ArmPosture]) -> Result<()> {
+        if same && self.section.is_none() && self.organs.iter().all(|o| o.shape.is_some()) {
+            for (organ, skin) in self.organs.iter().zip(self.skins.organs()).filter(|(_, skin)| skin.moved()) {
                 if let Some(shape) = organ.shape {
-                    self.stage.deform(shape, &organ.skin)?;
+                    self.stage.deform(shape, skin.positions())?;
                 }
-                organ.drawn_nodes.clone_from(&organ.organ.nodes);
             }
-            self.pose_arms(cell)
         } else {
             self.rebuild()?;
-            self.pose_arms(cell)
         }
+        self.pose_arms(arms)
     }
 
     /// Rebuilds the stage: the static part, which is shared, and the organs.
     pub fn rebuild(&mut self) -> Result<()> {
         self.stage = self.base.clone();
-        for organ in &mut self.organs {
-            let OrganInCell { recorded, surface, nodes, .. } = &organ.organ;
-            surface.positions(nodes, &mut organ.skin);
-            let mut mesh = surface.mesh.clone();
-            mesh.vertices.clone_from(&organ.skin);
-            let in_one = nodes.len() == recorded.body.vertices.len();
-            if let Some((point, normal)) = self.section.filter(|_| in_one) {
-                mesh = section(recorded, &organ.skin, nodes, point, normal);
+        for (organ, skin) in self.organs.iter_mut().zip(self.skins.organs()) {
+            let mut mesh = TriMesh { vertices: skin.positions().to_vec(), ..skin.mesh().clone() };
+            if let Some(((point, normal), (whole, nodes))) = self.section.zip(skin.whole()) {
+                mesh = section(whole, skin.positions(), nodes, point, normal);
             }
             tint(&mut mesh, self.imaging.tint);
             let (shape, _) = self.stage.add_mesh(&mesh, organ.label, &glossed(wet(0.3), self.imaging.gloss))?;
             organ.shape = Some(shape);
-            organ.drawn_nodes.clone_from(&organ.organ.nodes);
         }
         Ok(())
     }
 
-    fn pose_arms(&mut self, cell: &Cell) -> Result<()> {
-        for arm in &self.arms {
-            for (body, pose) in arm.links.iter().zip(cell.link_poses(arm.name)?) {
-                self.stage.place(*body, &pose)?;
+    fn pose_arms(&mut self, arms: &[ArmPosture]) -> Result<()> {
+        for (arm, posture) in self.arms.iter().zip(arms) {
+            for (body, pose) in arm.links.iter().zip(&posture.links) {
+                self.stage.place(*body, pose)?;
             }
-            let gripper = cell.gripper(arm.name)?;
+            let gripper = &posture.gripper;
             self.stage.place(arm.shaft, &gripper.pose)?;
             self.stage.place(arm.motor, &gripper.pose)?;
             for (body, side) in arm.blades.iter().zip([1.0, -1.0]) {

@@ -2,12 +2,9 @@
 
 use crate::instrument::Shapes;
 use crate::looks::{housing, polished, shell};
-use crate::organ::BoundSurface;
-use crate::organ_in_cell::OrganInCell;
+use crate::skins::{ArmPosture, Skins};
 use crate::surroundings::surroundings;
 use crate::{Result, arm};
-use glam::DVec3;
-use std::sync::Arc;
 use trocar_cell::{Cell, Placed};
 use trocar_core::Pose;
 use trocar_geometry::TriMesh;
@@ -52,27 +49,15 @@ pub struct DrawnBody {
     pub part: DrawnPart,
 }
 
-/// An organ as it is drawn.
-#[derive(Clone, Copy)]
-pub struct DrawnOrgan<'a> {
-    /// Its name.
-    pub name: &'a str,
-    /// Its surface, which follows the nodes.
-    pub surface: &'a Arc<BoundSurface>,
-    /// Nodes of all its pieces (m).
-    pub nodes: &'a [DVec3],
-    /// Bodies of the cell that are its pieces, in the order of the nodes.
-    pub bodies: &'a [usize],
-}
-
 /// A cell as meshes and poses.
 pub struct DrawnCell {
     /// The meshes.
     pub meshes: Vec<DrawnMesh>,
     /// The bodies that draw them.
     pub bodies: Vec<DrawnBody>,
+    /// The organs' surfaces.
+    pub skins: Skins,
     arms: Vec<&'static str>,
-    organs: Vec<OrganInCell>,
 }
 
 impl DrawnCell {
@@ -86,7 +71,7 @@ impl DrawnCell {
             meshes: Vec::new(),
             bodies: Vec::new(),
             arms: Vec::new(),
-            organs: placed.organs.iter().map(OrganInCell::new).collect(),
+            skins: Skins::placed(&placed),
         };
         for prop in surroundings(&placed, scene.placement.pose(), Some(scene))? {
             let mesh = all.mesh(prop.name.to_owned(), prop.mesh, prop.appearance);
@@ -109,7 +94,7 @@ impl DrawnCell {
             add(DrawnPart::Blade(1), &tool.instrument.name, upper, polished());
             add(DrawnPart::Blade(-1), &tool.instrument.name, lower, polished());
         }
-        all.update(cell)?;
+        all.skins.update(cell)?;
         Ok(all)
     }
 
@@ -123,40 +108,17 @@ impl DrawnCell {
         self.meshes.len() - 1
     }
 
-    /// Takes the organs' nodes from `cell`. Returns whether their surfaces have the same triangles
-    /// as before.
-    ///
-    /// # Errors
-    /// A cell of another scene.
-    pub fn update(&mut self, cell: &Cell) -> Result<bool> {
-        let mut same = true;
-        for organ in &mut self.organs {
-            same &= organ.follow(cell.world())?;
-        }
-        Ok(same)
-    }
-
-    /// The organs, as they were at the last update.
-    pub fn organs(&self) -> impl Iterator<Item = DrawnOrgan<'_>> {
-        self.organs.iter().map(|o| DrawnOrgan {
-            name: &o.recorded.name,
-            surface: &o.surface,
-            nodes: &o.nodes,
-            bodies: &o.bodies,
-        })
-    }
-
     /// Poses in the cell of the bodies that are not fixed, in their order.
     ///
     /// # Errors
     /// A cell of another scene.
     pub fn poses(&self, cell: &Cell) -> Result<Vec<Pose>> {
-        let mut links = Vec::with_capacity(self.arms.len());
+        let mut postures = Vec::with_capacity(self.arms.len());
         for arm in &self.arms {
-            links.push((cell.link_poses(arm)?, cell.gripper(arm)?));
+            postures.push(ArmPosture::of(cell, arm)?);
         }
         let pose = |body: &DrawnBody| {
-            let (links, gripper) = links.get(body.arm?)?;
+            let ArmPosture { links, gripper } = postures.get(body.arm?)?;
             match body.part {
                 DrawnPart::Fixed => None,
                 DrawnPart::Link(i) => links.get(i).copied(),

@@ -4,7 +4,7 @@ use crate::frame::{Frame, OrganFrame};
 use crate::hub::Hub;
 use crate::inbox::lock;
 use crate::shapes::Topology;
-use crate::snapshot::Snapshot;
+use crate::snapshot::{OrganShot, Snapshot};
 use crate::values::{energies, stretches};
 use glam::DVec3;
 use serde_json::json;
@@ -79,7 +79,6 @@ struct Making {
     topology: Option<Arc<Topology>>,
     organs: Vec<OrganFrame>,
     ranges: [[f32; 2]; 2],
-    skin: Vec<DVec3>,
     frames: u64,
 }
 
@@ -98,14 +97,14 @@ impl Making {
         let same_ranges = ranges == self.ranges;
         self.ranges = ranges;
         let mut organs = Vec::with_capacity(snapshot.organs.len());
-        for (k, (version, nodes)) in snapshot.organs.iter().enumerate() {
+        for (k, shot) in snapshot.organs.iter().enumerate() {
             let wants = [snapshot.wants.stretch, snapshot.wants.energy];
             let known = self.organs.get(k).filter(|o| {
-                o.version == *version && same_ranges && (0..2).all(|v| !wants[v] || o.values[v].is_some())
+                o.version == shot.version && same_ranges && (0..2).all(|v| !wants[v] || o.values[v].is_some())
             });
             organs.push(match known {
                 Some(known) => known.clone(),
-                None => self.organ(&snapshot.topology, k, *version, nodes, wants),
+                None => self.organ(&snapshot.topology, k, shot, wants),
             });
         }
         self.organs = organs;
@@ -132,10 +131,10 @@ impl Making {
         }));
     }
 
-    fn organ(&mut self, topology: &Topology, k: usize, version: u64, nodes: &[DVec3], wants: [bool; 2]) -> OrganFrame {
+    fn organ(&self, topology: &Topology, k: usize, shot: &OrganShot, wants: [bool; 2]) -> OrganFrame {
         let surface = &topology.surfaces[k];
-        surface.positions(nodes, &mut self.skin);
-        let (low, step, positions) = quantised(&self.skin);
+        let (low, step, positions) = quantised(&shot.skin);
+        let nodes = &shot.nodes[..];
         let mut values = [None, None];
         for (v, value) in values.iter_mut().enumerate().filter(|(v, _)| wants[*v]) {
             let of_nodes =
@@ -146,7 +145,7 @@ impl Making {
             let byte = |x: &f32| (255.0 * ((x - low) / (high - low)).clamp(0.0, 1.0)).round() as u8;
             *value = Some(of_vertices.iter().map(byte).collect());
         }
-        OrganFrame { version, low: low.to_array(), step: step.to_array(), positions, values }
+        OrganFrame { version: shot.version, low: low.to_array(), step: step.to_array(), positions, values }
     }
 }
 

@@ -175,13 +175,13 @@ fn cameras(episode: &Episode) -> Vec<Value> {
 impl Topology {
     /// Of the organs as `drawn` has them now.
     pub fn of(scene: u64, cell: &Cell, drawn: &DrawnCell) -> Self {
-        let organs = || drawn.organs();
+        let organs = || drawn.skins.organs().iter();
         Self {
             number: fresh(),
             scene,
-            names: organs().map(|o| o.name.to_owned()).collect(),
-            surfaces: organs().map(|o| Arc::clone(o.surface)).collect(),
-            bodies: organs().map(|o| o.bodies.to_vec()).collect(),
+            names: organs().map(|o| o.name().to_owned()).collect(),
+            surfaces: organs().map(|o| Arc::clone(o.surface())).collect(),
+            bodies: organs().map(|o| o.bodies().to_vec()).collect(),
             model: cell.world().model.clone(),
         }
     }

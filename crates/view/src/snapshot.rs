@@ -24,13 +24,23 @@ pub(crate) const ARM_COLUMNS: [&str; 45] = [
     "held_organ", "held_s", "follow", "slip_mm",
 ];
 
+/// A copy of an organ.
+#[derive(Clone)]
+pub(crate) struct OrganShot {
+    /// Grows when a node moves.
+    pub version: u64,
+    /// Vertices of its surface (m).
+    pub skin: Arc<Vec<DVec3>>,
+    /// Its nodes (m), for values on it.
+    pub nodes: Arc<Vec<DVec3>>,
+}
+
 /// A copy of what a frame shows.
 pub(crate) struct Snapshot {
     pub topology: Arc<Topology>,
     /// The message `scene`, if it is new.
     pub scene: Arc<Vec<u8>>,
-    /// Nodes of each organ, and a number that grows when they move.
-    pub organs: Vec<(u64, Arc<Vec<DVec3>>)>,
+    pub organs: Vec<OrganShot>,
     pub poses: Vec<f32>,
     pub arms: Vec<f32>,
     pub arm_count: usize,
@@ -50,7 +60,7 @@ pub(crate) struct Taker {
     pub drawn: DrawnCell,
     pub topology: Arc<Topology>,
     pub scene: Arc<Vec<u8>>,
-    organs: Vec<(u64, Arc<Vec<DVec3>>)>,
+    organs: Vec<OrganShot>,
 }
 
 impl Taker {
@@ -61,18 +71,18 @@ impl Taker {
 
     /// Follows the organs of `cell`. After a cut they have new surfaces.
     fn follow(&mut self, cell: &Cell) -> Result<()> {
-        if !self.drawn.update(cell)? {
+        if !self.drawn.skins.update(cell)? {
             self.topology = Arc::new(Topology::of(self.topology.scene, cell, &self.drawn));
             self.organs.clear();
         }
         let had = std::mem::take(&mut self.organs);
-        for (k, organ) in self.drawn.organs().enumerate() {
-            let known = had.get(k).filter(|(_, nodes)| nodes.as_slice() == organ.nodes);
-            let now = match known {
-                Some(known) => known.clone(),
-                None => (fresh(), Arc::new(organ.nodes.to_vec())),
-            };
-            self.organs.push(now);
+        for (k, organ) in self.drawn.skins.organs().iter().enumerate() {
+            let known = had.get(k).filter(|_| !organ.moved()).cloned();
+            self.organs.push(known.unwrap_or_else(|| OrganShot {
+                version: fresh(),
+                skin: Arc::new(organ.positions().to_vec()),
+                nodes: Arc::new(organ.nodes().to_vec()),
+            }));
         }
         Ok(())
     }
