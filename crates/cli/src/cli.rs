@@ -18,8 +18,8 @@ pub use scene::*;
 pub use specimens::*;
 pub use study::*;
 pub use task::*;
-pub use view::*;
 pub use trocar_studies::names::{BackName, DesignName, MesherName, SensorName, SolverName, Units};
+pub use view::*;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;

@@ -67,12 +67,7 @@ impl DrawnCell {
     /// Shapes that cannot be read; a cell of another scene.
     pub fn new(scene: &Scene, specimen: &Specimen, cell: &Cell) -> Result<Self> {
         let placed = Placed::new(scene, specimen)?.specimen;
-        let mut all = Self {
-            meshes: Vec::new(),
-            bodies: Vec::new(),
-            arms: Vec::new(),
-            skins: Skins::placed(&placed),
-        };
+        let mut all = Self { meshes: Vec::new(), bodies: Vec::new(), arms: Vec::new(), skins: Skins::placed(&placed) };
         for prop in surroundings(&placed, scene.placement.pose(), Some(scene))? {
             let mesh = all.mesh(prop.name.to_owned(), prop.mesh, prop.appearance);
             all.bodies.push(DrawnBody { mesh, arm: None, part: DrawnPart::Fixed });

@@ -137,8 +137,7 @@ impl Making {
         let nodes = &shot.nodes[..];
         let mut values = [None, None];
         for (v, value) in values.iter_mut().enumerate().filter(|(v, _)| wants[*v]) {
-            let of_nodes =
-                if v == 0 { stretches(topology, k, nodes) } else { energies(topology, k, nodes) };
+            let of_nodes = if v == 0 { stretches(topology, k, nodes) } else { energies(topology, k, nodes) };
             let mut of_vertices = Vec::new();
             surface.values(&of_nodes, &mut of_vertices);
             let [low, high] = self.ranges[v];

@@ -56,8 +56,7 @@ impl Frame {
         let mut organs = Vec::new();
         let new = |has: &Has, k: usize| self.organs[k].version > has.versions[k];
         for (k, organ) in self.organs.iter().enumerate().filter(|(k, _)| new(has, *k)) {
-            let mut said =
-                json!({"organ": k, "low": organ.low, "step": organ.step, "positions": format!("{k}.x")});
+            let mut said = json!({"organ": k, "low": organ.low, "step": organ.step, "positions": format!("{k}.x")});
             if kind.is_some_and(|v| organ.values[v].is_some()) {
                 said["values"] = json!(format!("{k}.o"));
             }

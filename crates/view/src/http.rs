@@ -71,7 +71,8 @@ impl Head {
         };
         let target = request.path.unwrap_or("");
         let (path, query) = target.split_once('?').unwrap_or((target, ""));
-        let text = |h: &httparse::Header<'_>| Some((h.name.to_ascii_lowercase(), String::from_utf8(h.value.to_vec()).ok()?));
+        let text =
+            |h: &httparse::Header<'_>| Some((h.name.to_ascii_lowercase(), String::from_utf8(h.value.to_vec()).ok()?));
         let Some(headers) = request.headers.iter().map(text).collect() else {
             return Err((400, "a header is no text".to_owned()));
         };
@@ -105,9 +106,7 @@ impl Head {
             host.split_once(':').map_or(host, |(name, _)| name)
         };
         let own = ["127.0.0.1", "localhost", "::1"].iter().any(|n| name.eq_ignore_ascii_case(n));
-        let same = |origin: &str| {
-            origin.strip_prefix("http://").is_some_and(|from| from.eq_ignore_ascii_case(host))
-        };
+        let same = |origin: &str| origin.strip_prefix("http://").is_some_and(|from| from.eq_ignore_ascii_case(host));
         own && self.header("origin").is_none_or(same)
     }
 }

@@ -28,14 +28,24 @@ pub(crate) enum Wish {
     Pause,
     Step(u32),
     Speed(f64),
-    Reset { seed: Option<u64>, policy: Option<String> },
+    Reset {
+        seed: Option<u64>,
+        policy: Option<String>,
+    },
     Seek(f64),
     Open(String),
     Live,
     Record(RecordAction),
     HandBack(ArmName),
-    History { channels: Vec<String>, from_s: f64 },
-    Picture { camera: String, size: [usize; 2], quality: Quality },
+    History {
+        channels: Vec<String>,
+        from_s: f64,
+    },
+    Picture {
+        camera: String,
+        size: [usize; 2],
+        quality: Quality,
+    },
     Table,
     /// A frame is wanted now: a client came, or wants other things in it.
     Refresh,

@@ -15,6 +15,7 @@ mod inbox;
 mod measured;
 mod message;
 mod operator;
+mod outbox;
 mod pace;
 mod page;
 mod picture;

@@ -1,9 +1,10 @@
 //! Pictures on request, rendered in a thread of their own.
 
 use crate::error::Result;
-use crate::hub::{Hub, Outgoing};
+use crate::hub::Hub;
 use crate::inbox::ClientId;
 use crate::message::{Binary, Data};
+use crate::outbox::Outgoing;
 use crate::protocol::{Mistake, Quality, error};
 use serde_json::json;
 use std::sync::Arc;

@@ -3,8 +3,8 @@
 use crate::error::Result;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use trocar_cell::{Action, ActionSpace, Cell, Setpoint};
 use trocar_campaign::PolicySpec;
+use trocar_cell::{Action, ActionSpace, Cell, Setpoint};
 use trocar_core::Pose;
 use trocar_task::policy::{POLICIES, Scripted};
 use trocar_task::{Episode, Policy};
@@ -45,7 +45,12 @@ pub(crate) fn names(own: &str) -> Vec<String> {
 ///
 /// # Errors
 /// A name that is none, a server that does not answer.
-pub(crate) fn make(name: &str, lift: bool, episode: &Episode, stop: &Arc<AtomicBool>) -> Result<Box<dyn Policy + Send>> {
+pub(crate) fn make(
+    name: &str,
+    lift: bool,
+    episode: &Episode,
+    stop: &Arc<AtomicBool>,
+) -> Result<Box<dyn Policy + Send>> {
     if name == OPERATOR {
         return Ok(Box::new(Still));
     }

@@ -104,14 +104,7 @@ pub(crate) enum Axes {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Servo {
     /// The whole motion since the clutch was pressed.
-    Relative {
-        clutch: u64,
-        axes: Axes,
-        camera: Option<String>,
-        scale: f64,
-        translation: [f64; 3],
-        rotation: [f64; 4],
-    },
+    Relative { clutch: u64, axes: Axes, camera: Option<String>, scale: f64, translation: [f64; 3], rotation: [f64; 4] },
     /// A pose in the cell.
     Pose([f64; 7]),
     /// The arm's numbers without the jaw.
@@ -261,8 +254,8 @@ pub(crate) struct Mistake(pub &'static str, pub String);
 
 /// A message of a client with its number for the reply.
 pub(crate) fn parse(text: &str) -> Result<(Option<i64>, Said), (Option<i64>, Mistake)> {
-    let value: Value =
-        serde_json::from_str(text).map_err(|e| (None, Mistake("type", format!("the message is no JSON object: {e}"))))?;
+    let value: Value = serde_json::from_str(text)
+        .map_err(|e| (None, Mistake("type", format!("the message is no JSON object: {e}"))))?;
     let request = value.get("request").and_then(Value::as_i64);
     let fail = |code, why| Err((request, Mistake(code, why)));
     let Some(kind) = value.get("type").and_then(Value::as_str).map(str::to_owned) else {
@@ -321,13 +314,13 @@ fn check(said: &Said) -> Option<String> {
             .or_else(|| finite("pose", pose))
             .or_else(|| turn(&pose[3..]))
             .or_else(|| jaw(opening)),
-        Said::ServoJp { time_s, positions, .. } => finite("time_s", &[*time_s])
-            .or_else(|| finite("positions", positions))
-            .or_else(|| match positions.len() {
+        Said::ServoJp { time_s, positions, .. } => {
+            finite("time_s", &[*time_s]).or_else(|| finite("positions", positions)).or_else(|| match positions.len() {
                 4 => None,
                 5 => jaw(&Some(positions[4])),
                 n => Some(format!("positions has {n} numbers; 4, or 5 with the jaw")),
-            }),
+            })
+        }
         Said::ServoJaw { time_s, opening, .. } => finite("time_s", &[*time_s]).or_else(|| jaw(&Some(*opening))),
         _ => None,
     }

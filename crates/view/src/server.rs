@@ -249,9 +249,10 @@ fn request(stream: &mut TcpStream, shared: &Shared) -> Option<Vec<u8>> {
     for (name, value) in &head.headers {
         asked = asked.header(name, value);
     }
-    let response = asked.body(()).map_err(|e| e.to_string()).and_then(|asked| {
-        tungstenite::handshake::server::create_response(&asked).map_err(|e| e.to_string())
-    });
+    let response = asked
+        .body(())
+        .map_err(|e| e.to_string())
+        .and_then(|asked| tungstenite::handshake::server::create_response(&asked).map_err(|e| e.to_string()));
     let response = match response {
         Ok(response) => response,
         Err(why) => return refused(stream, 400, &format!("no WebSocket handshake: {why}")),

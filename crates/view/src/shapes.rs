@@ -83,9 +83,9 @@ pub(crate) fn scene_message(number: u64, episode: &Episode, drawn: &DrawnCell) -
     });
     let stages: Vec<Value> = stages.collect();
     let definition = scene.task_context()?.definition;
-    let aborts: Vec<Value> =
-        definition.aborts.iter().map(|a| json!({"name": a.name, "when": a.when})).collect();
-    let gates: Vec<Value> = program.constants.iter().map(|(name, value)| json!({"name": name, "value": value})).collect();
+    let aborts: Vec<Value> = definition.aborts.iter().map(|a| json!({"name": a.name, "when": a.when})).collect();
+    let gates: Vec<Value> =
+        program.constants.iter().map(|(name, value)| json!({"name": name, "value": value})).collect();
     let ports: Vec<Value> = scene
         .ports
         .iter()

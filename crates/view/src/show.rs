@@ -420,4 +420,3 @@ fn add_commands(header: &mut Value, operators: Option<&Operators>) {
     };
     header["commands"] = json!({"left": shown(ArmName::Left), "right": shown(ArmName::Right)});
 }
-

@@ -2,8 +2,9 @@
 
 use crate::frame::Has;
 use crate::http::Timed;
-use crate::hub::{Client, Hub, Next, Outgoing};
+use crate::hub::Hub;
 use crate::inbox::{Request, Wish};
+use crate::outbox::{Client, Next, Outgoing};
 use crate::protocol::{MAX_ERRORS, MAX_MESSAGE, MAX_RATE, Mistake, Said, done, error, parse};
 use serde_json::json;
 use std::io::{Read, Write};

@@ -1,12 +1,14 @@
 //! The simulation's thread: it plays an episode at a pace, does what clients ask, and tells how it
 //! stands. It never waits for a client.
 
+mod status;
+
 use crate::encode::Encoder;
 use crate::error::{Error, Result};
-use crate::hub::{Hub, Outgoing};
+use crate::hub::Hub;
 use crate::inbox::{Request, Wish};
 use crate::message::{Binary, Data};
-use crate::operator::arm_of;
+use crate::outbox::Outgoing;
 use crate::pace::Pace;
 use crate::picture::Pictures;
 use crate::protocol::{ArmName, Mistake, RecordAction, done, error};
@@ -14,7 +16,8 @@ use crate::record::Recorder;
 use crate::show::{Around, Show};
 use crate::source::{Building, Source};
 use crate::table::Folder;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
+use status::Telling;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -65,23 +68,6 @@ pub(crate) struct Session {
     told: Instant,
     /// A frame is wanted though nothing moves.
     stale: bool,
-}
-
-/// Tells clients how the building goes.
-struct Telling<'a> {
-    hub: &'a Hub,
-    stop: &'a AtomicBool,
-}
-
-impl Progress for Telling<'_> {
-    fn begin(&self, stage: &str, _: u64) {
-        self.hub.tell_status(&json!({"type": "status", "phase": "building", "message": stage}));
-    }
-    fn advance(&self, _: u64) {}
-    fn end(&self) {}
-    fn interrupted(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
-    }
 }
 
 /// Builds and runs a session until `stop` is set. What fails is told to the clients and returned.
@@ -245,7 +231,12 @@ impl Session {
     }
 
     /// Does what is asked. Returns the reply, unless it is sent later.
-    fn grant(&mut self, client: u32, number: Option<i64>, wish: Wish) -> std::result::Result<Option<Outgoing>, Mistake> {
+    fn grant(
+        &mut self,
+        client: u32,
+        number: Option<i64>,
+        wish: Wish,
+    ) -> std::result::Result<Option<Outgoing>, Mistake> {
         let done = Some(Outgoing::text(&done(number)));
         match wish {
             Wish::Play => {
@@ -302,7 +293,8 @@ impl Session {
         let had = self.show.live.as_ref().is_some_and(|l| l.operators.actor(arm).name() != "policy");
         if had {
             self.playing = false;
-            self.note = Some(format!("the operator of the {} arm is gone: paused, the arm holds its place", arm.name()));
+            self.note =
+                Some(format!("the operator of the {} arm is gone: paused, the arm holds its place", arm.name()));
         }
     }
 
@@ -397,7 +389,8 @@ impl Session {
     }
 
     fn history(&self, number: Option<i64>, names: &[String], from_s: f64) -> std::result::Result<Outgoing, Mistake> {
-        let unknown = |name: String| Mistake("value", format!("no channel '{name:.60}'; the scene's message lists them"));
+        let unknown =
+            |name: String| Mistake("value", format!("no channel '{name:.60}'; the scene's message lists them"));
         let (times, rows) = self.show.history(names, from_s).map_err(unknown)?;
         let header = json!({"type": "history", "request": number, "channels": names, "from_s": from_s});
         let mut message = Binary::new(header);
@@ -416,34 +409,6 @@ impl Session {
         let message = crate::measured::message(&self.show)?;
         due.iter().for_each(|client| client.reply(message.clone()));
         Ok(())
-    }
-
-    /// Tells all how it stands.
-    fn tell(&mut self) {
-        self.told = Instant::now();
-        let (show, period) = (&self.show, self.show.period());
-        let file = show.file.as_ref();
-        let cell = show.episode.cell();
-        let actors: Map<String, Value> =
-            cell.arms().iter().map(|(s, _)| (s.name().to_owned(), json!(show.actor(arm_of(*s))))).collect();
-        let end = show.episode.end().filter(|_| !show.in_review());
-        let progress = show.episode.progress();
-        let folder = self.recorder.as_ref().map(|r| r.folder.display().to_string());
-        let policy = show.live.as_ref().map(|l| l.policy_name.clone());
-        let length_s = file.map_or(show.episode.scene().task.episode_s, |_| show.head() as f64 * period);
-        self.hub.tell_status(&json!({
-            "type": "status", "phase": "ready", "message": "", "scene": show.taker.topology.scene,
-            "seed": show.episode.seed(), "policy": policy.or(file.map(|f| f.header.policy.clone())),
-            "playing": self.playing && !show.is_over(), "mode": show.mode(), "seeking": self.goal.is_some(),
-            "speed_target": self.pace.factor(), "speed_actual": if self.playing { self.pace.actual() } else { 0.0 },
-            "time_s": show.episode.time(), "head_s": show.head() as f64 * period, "length_s": length_s,
-            "seekable_s": show.head() as f64 * period,
-            "end": end.map(|e| json!({"kind": e.name(), "text": e.to_string()})),
-            "passed": progress.passed(), "score": progress.score(), "stage": progress.name(), "actors": actors,
-            "exact": file.map(|_| show.differs_s.is_none()), "differs_s": show.differs_s, "open": self.open,
-            "record": {"folder": folder, "state": self.record_state, "path": self.record_path},
-            "seats": self.hub.seats(), "note": self.note,
-        }));
     }
 }
 
