@@ -220,11 +220,12 @@ impl Episode {
         self.step_watched(action, &mut |_| {})
     }
 
-    /// The same with a `watch` that sees the cell after each tissue frame but the last.
+    /// The same with a `watch` that sees the cell after each tissue frame. What it does must not
+    /// change the steps that follow.
     ///
     /// # Errors
     /// As [`step`](Self::step).
-    pub fn step_watched(&mut self, action: &Action, watch: &mut dyn FnMut(&Cell)) -> Result<Step> {
+    pub fn step_watched(&mut self, action: &Action, watch: &mut dyn FnMut(&mut Cell)) -> Result<Step> {
         if let Some(end) = &self.now.end {
             return Err(Error::Ended(end.to_string()));
         }

@@ -5,6 +5,7 @@
 //! slow one misses frames, and the simulation never waits. What clients send changes nothing but
 //! through the actions of the episode, so that what an operator does is an episode file.
 
+pub mod client;
 mod encode;
 mod error;
 mod frame;

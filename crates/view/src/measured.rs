@@ -2,10 +2,11 @@
 
 use crate::error::Result;
 use crate::hub::Outgoing;
-use crate::operator::arm_of;
+use crate::operator::{Operators, arm_of};
 use crate::shapes::pose_numbers;
 use crate::show::Show;
 use serde_json::{Map, json};
+use trocar_cell::Cell;
 use trocar_robot::wrench::ForceKind;
 
 /// The message `measured`.
@@ -30,4 +31,21 @@ pub(crate) fn message(show: &Show) -> Result<Outgoing> {
     }
     let step = show.at;
     Ok(Outgoing::text(&json!({"type": "measured", "step": step, "time_s": show.episode.time(), "arms": arms})))
+}
+
+/// The messages `haptic` of all arms, after `part` tissue frames of the period `step`.
+pub(crate) fn haptic(cell: &mut Cell, operators: Option<&Operators>, step: usize, part: u32) -> Result<Vec<Outgoing>> {
+    let time_s = cell.time() + f64::from(part % cell.frames()) * trocar_cell::FRAME;
+    let mut all = Vec::new();
+    for (side, _) in cell.arms() {
+        let model = cell.haptic_model(side.name())?;
+        let force: Vec<f64> = model.wrench.force.to_array().into_iter().chain(model.wrench.torque.to_array()).collect();
+        let shown = operators.and_then(|o| o.shown(arm_of(side)));
+        all.push(Outgoing::text(&json!({
+            "type": "haptic", "arm": side.name(), "step": step, "part": part, "time_s": time_s,
+            "pose": pose_numbers(&model.tip), "force": force, "stiffness": model.stiffness.as_flattened(),
+            "seq": shown.map(|s| s.seq),
+        })));
+    }
+    Ok(all)
 }

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use trocar_specimen::StagedFolder;
 use trocar_task::RESULT_FILE;
+use trocar_workflow::{SURFACES_FILE, SurfaceWatch};
 
 /// What the operator sent, one JSON object a line.
 const INPUT_FILE: &str = "input.jsonl";
@@ -49,8 +50,8 @@ impl Recorder {
     ///
     /// # Errors
     /// A folder that cannot be written.
-    pub fn keep(&self, show: &Show) -> Result<(PathBuf, bool)> {
-        let Some(live) = &show.live else {
+    pub fn keep(&self, show: &mut Show) -> Result<(PathBuf, bool)> {
+        let Some(live) = &mut show.live else {
             return Err(Error::Source("an episode file is shown; only a live episode can be kept".to_owned()));
         };
         let number = (1..).find(|n| !self.folder.join(format!("{n:06}")).exists()).unwrap_or(0);
@@ -73,6 +74,11 @@ impl Recorder {
         let rows = live.actors.iter().enumerate();
         let rows: String = rows.map(|(k, [l, r])| format!("{},{},{}\n", k + 1, l.name(), r.name())).collect();
         write(ACTORS_FILE, format!("step,left,right\n{rows}"))?;
+        let surfaces = std::mem::replace(&mut live.surfaces, SurfaceWatch::new(false));
+        if let Some(bytes) = surfaces.finish()? {
+            let path = staged.path().join(SURFACES_FILE);
+            std::fs::write(&path, bytes).map_err(|source| Error::Io { path, source })?;
+        }
         staged.commit().map_err(trocar_workflow::Error::from)?;
         Ok((folder, passed))
     }

@@ -115,7 +115,7 @@ impl Session {
             }
         };
         if show.file.is_none() {
-            show.reset(seed, &policy, stop)?;
+            show.reset(seed, &policy, plan.record.is_some(), stop)?;
         }
         let encoder = Encoder::start(Arc::clone(hub))
             .map_err(|why| Error::Source(format!("a thread cannot be started: {why}")))?;
@@ -328,7 +328,7 @@ impl Session {
         for arm in [ArmName::Left, ArmName::Right] {
             self.hub.let_go(arm);
         }
-        let made = self.show.reset(seed, &policy, &self.stop);
+        let made = self.show.reset(seed, &policy, self.recorder.is_some(), &self.stop);
         if let Err(why) = made {
             return Err(Mistake("value", why.to_string()));
         }
@@ -383,7 +383,7 @@ impl Session {
                 let mut around = Around { hub: &self.hub, encoder: &self.encoder, pace: &mut self.pace };
                 self.show.advance(&mut around, true).map_err(internal)?;
             }
-            let (path, passed) = recorder.keep(&self.show).map_err(internal)?;
+            let (path, passed) = recorder.keep(&mut self.show).map_err(internal)?;
             reply["path"] = json!(path.display().to_string());
             reply["passed"] = json!(passed);
         }

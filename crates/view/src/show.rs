@@ -4,6 +4,7 @@
 use crate::encode::Encoder;
 use crate::error::Result;
 use crate::hub::Hub;
+use crate::measured::haptic;
 use crate::operator::{Actor, Operators, arm_of};
 use crate::pace::Pace;
 use crate::policy;
@@ -19,6 +20,7 @@ use trocar_cell::{Action, Cell, CellEvent};
 use trocar_scene::Scene;
 use trocar_sensors::{CameraRig, DrawnCell};
 use trocar_task::{Channels, Episode, EpisodeFile, EpisodeState, Kept, Policy, Step};
+use trocar_workflow::SurfaceWatch;
 
 /// Time between states that are kept (s).
 const KEYFRAME_S: f64 = 1.0;
@@ -32,6 +34,8 @@ pub(crate) struct Live {
     pub kept: Kept,
     /// Who moved each arm (left, right) in each period.
     pub actors: Vec<[Actor; 2]>,
+    /// What pictures of it are made of, where it may be kept.
+    pub surfaces: SurfaceWatch,
 }
 
 /// An episode that is shown.
@@ -59,6 +63,20 @@ pub(crate) struct Around<'a> {
     pub hub: &'a Hub,
     pub encoder: &'a Encoder,
     pub pace: &'a mut Pace,
+}
+
+impl Around<'_> {
+    /// Sends the local models of tissue to haptic devices.
+    fn feel(&self, cell: &mut Cell, operators: Option<&Operators>, step: usize, part: u32) -> Result<()> {
+        let clients = self.hub.haptic_clients();
+        if clients.is_empty() {
+            return Ok(());
+        }
+        for message in haptic(cell, operators, step, part)? {
+            clients.iter().for_each(|client| client.reply(message.clone()));
+        }
+        Ok(())
+    }
 }
 
 fn taker(episode: &Episode) -> Result<Taker> {
@@ -104,12 +122,13 @@ impl Show {
         self.note_row();
     }
 
-    /// Begins the live episode of `seed` by the policy of that name.
+    /// Begins the live episode of `seed` by the policy of that name; `records` tells whether it may be
+    /// kept.
     ///
     /// # Errors
     /// A policy that is none or cannot begin, an episode that cannot be built; the show stays as it
     /// was if the policy is none.
-    pub fn reset(&mut self, seed: u64, name: &str, stop: &Arc<AtomicBool>) -> Result<()> {
+    pub fn reset(&mut self, seed: u64, name: &str, records: bool, stop: &Arc<AtomicBool>) -> Result<()> {
         let had = self.live.take();
         let mut made = match had {
             Some(live) if live.policy_name == name => Ok(live.policy),
@@ -130,8 +149,10 @@ impl Show {
         made.begin(&self.episode, seed)?;
         let kept = Kept::begin(&self.episode, made.name())?;
         let (chunk, operators) = (VecDeque::new(), Operators::default());
-        self.live =
-            Some(Live { policy: made, policy_name: name.to_owned(), chunk, operators, kept, actors: Vec::new() });
+        let mut surfaces = SurfaceWatch::new(records);
+        surfaces.see(&self.episode, None);
+        let (policy_name, actors) = (name.to_owned(), Vec::new());
+        self.live = Some(Live { policy: made, policy_name, chunk, operators, kept, actors, surfaces });
         self.begin();
         Ok(())
     }
@@ -226,6 +247,7 @@ impl Show {
             }
             (None, Some(live)) => {
                 live.kept.add(action, hash);
+                live.surfaces.see(&self.episode, Some(&step));
                 live.actors.push([ArmName::Left, ArmName::Right].map(|arm| live.operators.actor(arm)));
             }
             (None, None) => {}
@@ -278,13 +300,20 @@ impl Show {
     fn step(&mut self, action: &Action, around: &mut Around<'_>, quiet: bool) -> Result<Option<Step>> {
         let begin = around.pace.due();
         let frame_s = trocar_cell::FRAME;
-        let (mut part, mut failed) = (0, None);
+        let (mut part, mut failed, at) = (0, None, self.at);
         let head = header(self, self.at);
         let Self { episode, taker, live, row, stages, .. } = self;
         let operators = live.as_ref().map(|l| &l.operators);
-        let stepped = episode.step_watched(action, &mut |cell: &Cell| {
+        let stepped = episode.step_watched(action, &mut |cell: &mut Cell| {
             part += 1;
             if quiet {
+                return;
+            }
+            if failed.is_none() {
+                failed = around.feel(cell, operators, at, part).err();
+            }
+            if part == cell.frames() {
+                // The frame of a whole period has its row.
                 return;
             }
             if failed.is_none() && around.hub.wants_frame() {

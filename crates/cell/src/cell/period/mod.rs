@@ -31,25 +31,20 @@ impl Cell {
         self.step_watched(action, &mut |_| {})
     }
 
-    /// The same with a `watch` that sees the cell after each tissue frame but the last.
+    /// The same with a `watch` that sees the cell after each tissue frame. What it does must not
+    /// change the steps that follow.
     ///
     /// # Errors
     /// As [`step`](Self::step).
     pub fn step_watched<'a>(
         &mut self,
         action: impl Into<Option<&'a Action>>,
-        watch: &mut dyn FnMut(&Self),
+        watch: &mut dyn FnMut(&mut Self),
     ) -> Result<CellReport> {
         let (mut clock, mut wall) = (Instant::now(), Duration::ZERO);
         let mut log = PeriodLog::default();
         self.take(action.into())?;
         for frame in 0..self.frames {
-            if frame > 0 {
-                // The time of whoever watches is not the cell's.
-                wall += clock.elapsed();
-                watch(self);
-                clock = Instant::now();
-            }
             self.move_arms(frame, &mut log)?;
             let start = self.begin_tissue_frame();
             let World { model, state, stepper, .. } = &mut self.world;
@@ -57,6 +52,10 @@ impl Cell {
             self.end_tissue_frame(start, &tissue, &mut log);
             self.exchange_forces(&mut log)?;
             self.enforce_tissue_limits(tissue.min_volume_ratio, &mut log);
+            // The time of whoever watches is not the cell's.
+            wall += clock.elapsed();
+            watch(self);
+            clock = Instant::now();
         }
         self.periods += 1;
         let report = self.observe_period(log);
