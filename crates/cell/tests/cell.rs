@@ -160,6 +160,38 @@ fn every_kind_of_arm_lifts_the_tube_by_actions() {
     }
 }
 
+/// The local model of the tissue predicts the force after a small motion of the tip.
+#[test]
+fn a_haptic_model_predicts_the_force_of_the_next_motion() {
+    let mut cell = Cell::new(&ideal(false), &two_tubes(ONE_END, 2.2e-3), 1).unwrap();
+    grasp_and_lift(&mut cell, "left", HELD, 0.01);
+    let before = cell.haptic_model("left").unwrap();
+    assert!(before.wrench.force.length() > 0.02, "{before:?}");
+    let saved = cell.save();
+    for axis in DVec3::AXES {
+        cell.restore(&saved).unwrap();
+        cell.step(None).unwrap();
+        let before = cell.haptic_model("left").unwrap();
+        let pose = cell.measured_cp("left").unwrap();
+        send(&mut cell, "left", &Pose { translation: pose.translation + 2e-4 * axis, ..pose }, 0.0, 1);
+        let after = cell.haptic_model("left").unwrap();
+        let moved = after.tip.translation - before.tip.translation;
+        assert!(moved.length() > 1e-4, "{moved}");
+        let row = |c: usize| (0..3).map(|k| before.stiffness[c][k] * moved[k]).sum::<f64>();
+        let expected = -DVec3::new(row(0), row(1), row(2));
+        let change = after.wrench.force - before.wrench.force;
+        println!("moved {:.3} mm: {:.4} N, expected {:.4} N", 1e3 * moved, change, expected);
+        // The tube is bent by 20 degrees, and relaxes within the period's second frame.
+        let share = expected.length() / change.length();
+        assert!((0.5..2.0).contains(&share), "{change} N, {expected} N expected");
+        assert!(change.dot(expected) > 0.85 * change.length() * expected.length(), "{change} N, {expected} N expected");
+    }
+    cell.servo_jaw("left", 1.0).unwrap();
+    let back = Pose { translation: before.tip.translation + 0.03 * DVec3::Z, ..before.tip };
+    send(&mut cell, "left", &back, 1.0, 30);
+    assert_eq!(cell.haptic_model("left").unwrap().stiffness, [[0.0; 6]; 6], "away from tissue");
+}
+
 /// Places of the tip of an ideal arm (m) at its start and after each of `count` tip actions of 1 mm
 /// along x, with a delay of `ms`; and the state's hash in the end.
 fn moved_late(ms: f64, count: usize) -> (Vec<DVec3>, u64) {
