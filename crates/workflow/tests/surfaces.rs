@@ -7,7 +7,7 @@
 use std::path::Path;
 use trocar_core::Silent;
 use trocar_render::RenderSettings;
-use trocar_scene::SpecimenSource;
+use trocar_scene::{Distribution, Factor, SpecimenSource};
 use trocar_sensors::{ArmPosture, CameraRig, Skins};
 use trocar_specimen::Specimen;
 use trocar_task::{EPISODE_FILE, Episode, policy, run_watched};
@@ -33,6 +33,7 @@ fn recorded(folder: &Path) -> (Seen, Vec<u8>) {
     let mut scene = resection();
     scene.specimen = SpecimenSource::folder("tube");
     scene.task.sever = true;
+    scene.variation.factors.insert(Factor::LampScale, Distribution::Uniform([0.4, 0.5]));
     scene.folder = folder.to_owned();
     scene.cameras.retain(|c| c.name == "endoscope");
     scene.validate().unwrap();
@@ -186,6 +187,15 @@ fn surfaces_give_what_was_seen() {
     assert!(differ < 0.05, "pictures differ by {differ} of 255");
 
     check_gltf(folder.path(), &seen);
+
+    // The lamp was drawn; under the scene's own light the same frame is brighter.
+    let sum = |episode: &mut RecordedEpisode| -> u64 {
+        let picture = episode.picture("endoscope", SIZE, &SETTINGS).unwrap();
+        picture.color.pixels.as_flattened().iter().map(|v| u64::from(*v)).sum()
+    };
+    let drawn = sum(&mut open(folder.path()).unwrap());
+    let plain = sum(&mut open(folder.path()).unwrap().in_plain_light());
+    assert!(plain as f64 > 1.2 * drawn as f64, "{plain} {drawn}");
 
     // Without surfaces the episode is replayed, which gives the same file.
     std::fs::remove_file(&path).unwrap();

@@ -27,6 +27,9 @@ pub struct Export {
     /// Also episodes that did not pass.
     #[arg(long)]
     pub all: bool,
+    /// Light, exposure, gloss and tint of the scene, instead of those drawn for each episode.
+    #[arg(long)]
+    pub plain_light: bool,
     /// Specimen folder, if it was moved from its place in the scene.
     #[arg(long, value_name = "FOLDER")]
     pub specimen: Option<PathBuf>,

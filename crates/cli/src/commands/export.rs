@@ -30,7 +30,8 @@ pub fn run(arguments: &Export, json: bool, quiet: bool, progress: &dyn Progress)
     if let Some(specimen) = &arguments.specimen {
         command.arg("--specimen").arg(specimen);
     }
-    for (wanted, option) in [(arguments.all, "--all"), (json, "--json"), (quiet, "--quiet")] {
+    let plain = (arguments.plain_light, "--plain-light");
+    for (wanted, option) in [(arguments.all, "--all"), plain, (json, "--json"), (quiet, "--quiet")] {
         if wanted {
             command.arg(option);
         }
@@ -43,7 +44,7 @@ pub fn run(arguments: &Export, json: bool, quiet: bool, progress: &dyn Progress)
     match status.code() {
         Some(0) => Ok(()),
         Some(INTERRUPTED) => Err(Error::Interrupted),
-        Some(SAID) => Err(Error::Mismatch("nothing more was exported".to_owned())),
+        Some(SAID) => Err(Error::Mismatch("nothing was exported".to_owned())),
         _ => Err(Error::Mismatch(format!("{python} -m trocar.export ended with {status}"))),
     }
 }
