@@ -50,8 +50,8 @@ export class Bodies {
         new THREE.MeshPhysicalMaterial({
           color,
           vertexColors: colored,
-          roughness: mesh.wet ? 0.5 : Math.min(Math.max(mesh.roughness, 0.12), 1),
-          metalness: mesh.metal ? 0.9 : 0,
+          roughness: mesh.wet ? 0.5 : Math.min(Math.max(mesh.roughness, 0.3), 1),
+          metalness: mesh.metal ? 0.65 : 0,
           clearcoat: mesh.wet ? 0.6 : 0,
           clearcoatRoughness: 0.22,
           side: SHEETS.has(mesh.name) ? THREE.DoubleSide : THREE.FrontSide,

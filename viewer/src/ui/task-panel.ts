@@ -3,6 +3,7 @@
 import type { Session } from "../wire/session.ts";
 import { button, el, select, setAttribute, setText } from "./dom.ts";
 import { number, seconds, title } from "./format.ts";
+import { withThresholds } from "./thresholds.ts";
 
 interface Row {
   root: HTMLLIElement;
@@ -176,15 +177,4 @@ export class TaskPanel {
       if (cell) setText(cell, organ >= 0 ? title(this.session.organs[organ]?.name ?? "tissue") : "Nothing");
     });
   }
-}
-
-/** A stage's condition with the values of the gates that it names. */
-export function withThresholds(when: string, gates: { name: string; value: number }[]): string {
-  const value = new Map(gates.map((gate) => [gate.name, gate.value]));
-  return when.replace(/gates\.\w+/g, (name) => {
-    const known = value.get(name);
-    if (known === undefined) return name;
-    const unit = name.endsWith("_mm") ? " mm" : name.endsWith("_s") ? " s" : name.endsWith("_n") ? " N" : "";
-    return `${known}${unit}`;
-  });
 }
