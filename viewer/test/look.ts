@@ -3,10 +3,13 @@
 import { fileURLToPath } from "node:url";
 import { at, launch, openPage } from "./browser.ts";
 import { FakeServer } from "./fake/server.ts";
+import { tunnel } from "./tunnel.ts";
 
 const [address = "fake", folder = ".", only = ""] = process.argv.slice(2);
-const fake = address === "fake" ? new FakeServer(fileURLToPath(new URL("../../dist", import.meta.url))) : null;
-const url = fake ? await fake.listen() : address;
+const dist = fileURLToPath(new URL("../../dist", import.meta.url));
+const fake = address === "fake" ? new FakeServer(dist) : null;
+const real = fake ? null : await tunnel(address, dist);
+const url = fake ? await fake.listen() : real!.address;
 const browser = await launch();
 const looks = [
   { name: "light-1280", width: 1280, height: 760, dark: false, tab: "task" },
@@ -28,3 +31,4 @@ for (const look of looks) {
 }
 await browser.close();
 fake?.close();
+real?.close();

@@ -21,7 +21,7 @@ export class DrivePanel {
   readonly operator: Operator;
   private readonly devices: Device[];
   private readonly keyboard: Keyboard;
-  private readonly mouse: Mouse;
+  readonly mouse: Mouse;
   private readonly gamepad: GamepadDevice;
   private readonly sliders: ActionSliders;
   private readonly record: RecordBox;

@@ -132,7 +132,7 @@ export class TaskPanel {
     const status = this.session.status;
     const allowed = this.session.has("controls") && status?.phase === "ready";
     for (const control of [this.policy.input, this.seed, this.begin]) control.disabled = !allowed;
-    if (!status) return;
+    if (status?.phase !== "ready") return;
     if (document.activeElement !== this.seed && document.activeElement !== this.begin) this.seed.value = String(status.seed);
     if (document.activeElement !== this.policy.input) this.policy.input.value = status.policy;
     const score = status.score === undefined ? "" : ` Score ${number(status.score, 2)}.`;

@@ -40,6 +40,8 @@ export interface Status {
   head_s: number;
   length_s: number;
   seekable_s: number;
+  /** Whether a place to which was sought is still being computed. */
+  seeking?: boolean;
   end?: { kind: string; text: string } | null;
   passed?: boolean;
   score?: number;

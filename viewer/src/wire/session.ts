@@ -50,6 +50,12 @@ interface Events {
   done: Done;
 }
 
+/** What a status says before the scene is ready. */
+const BEFORE: Status = {
+  type: "status", phase: "building", scene: 0, seed: 0, policy: "", playing: false, mode: "live", speed_target: 1, speed_actual: 0,
+  time_s: 0, head_s: 0, length_s: 0, seekable_s: 0, actors: {}, seats: {},
+};
+
 const NOTHING = new Float32Array(0);
 
 export class Session extends Emitter<Events> {
@@ -147,8 +153,8 @@ export class Session extends Emitter<Events> {
         this.subscribe({});
         break;
       case "status":
-        this.status = message as unknown as Status;
-        if (this.status.seats) this.setSeats(this.status.seats);
+        this.status = { ...BEFORE, ...(message as Partial<Status>) };
+        if (message["seats"]) this.setSeats(this.status.seats);
         this.emit("status", this.status);
         break;
       case "seats": {
