@@ -16,6 +16,7 @@ import { DrivePanel } from "./ui/drive-panel.ts";
 import { Bar } from "./ui/bar.ts";
 import { Cover } from "./ui/cover.ts";
 import { el } from "./ui/dom.ts";
+import { sentence } from "./ui/format.ts";
 import { EpisodesPanel } from "./ui/episodes-panel.ts";
 import { Inset } from "./ui/inset.ts";
 import { listen } from "./ui/keys.ts";
@@ -30,8 +31,8 @@ import { Connection } from "./wire/connection.ts";
 import { VERSION } from "./wire/messages.ts";
 import { Session } from "./wire/session.ts";
 
-/** From where the first view looks: in front of the table, above it. */
-const HOME_FROM = new THREE.Vector3(0.25, -0.95, 0.8);
+/** From where the first view looks: in front of the table, to its right, above it. */
+const HOME_FROM = new THREE.Vector3(0.62, -0.78, 0.82);
 /** The first view shows the organs and this much round them (m): the ports and the wrists. */
 const HOME_MARGIN_M = 0.035;
 
@@ -85,10 +86,10 @@ function start(): void {
     if (session.scene) for (const port of session.scene.header.ports) box.expandByPoint(new THREE.Vector3().fromArray(port.centre_m));
     world.setHome(box.expandByScalar(HOME_MARGIN_M), HOME_FROM);
   });
-  session.on("problem", (problem) => say(problem, "bad"));
-  session.on("error", (error) => say(error.message, "bad"));
+  session.on("problem", (problem) => say(sentence(problem), "bad"));
+  session.on("error", (error) => say(sentence(error.message), "bad"));
   session.on("event", (event) => {
-    if (event.text) say(event.text);
+    if (event.text) say(sentence(event.text));
   });
   session.on("hello", (hello) => {
     if (hello.version !== VERSION) say(`The simulator speaks version ${hello.version} of the wire; this page needs ${VERSION}.`, "bad");

@@ -19,6 +19,8 @@ export class Keyboard implements Device {
   /** The arm that the keys move. */
   arm = 0;
   private readonly down = new Set<string>();
+  /** Keys that went down since the last reading: a tap counts even between two readings. */
+  private readonly tapped = new Set<string>();
   /** While the axis test runs, keys count wherever the focus is. */
   testing = false;
 
@@ -35,7 +37,9 @@ export class Keyboard implements Device {
       if (event.code !== CLUTCH_KEY && !(event.code in KEYS)) return;
       if (event.code === CLUTCH_KEY && !inView) return;
       event.preventDefault();
-      if (!event.repeat) this.down.add(event.code);
+      if (event.repeat) return;
+      this.down.add(event.code);
+      if (event.code !== CLUTCH_KEY) this.tapped.add(event.code);
     });
     addEventListener("keyup", (event) => this.down.delete(event.code));
     canvas.addEventListener("blur", () => this.clear());
@@ -43,16 +47,23 @@ export class Keyboard implements Device {
 
   read(): Reading[] {
     const reading = atRest();
-    reading.clutch = this.down.has(CLUTCH_KEY);
-    for (const code of this.down) {
+    reading.clutch = this.clutch;
+    for (const code of new Set([...this.down, ...this.tapped])) {
       const key = KEYS[code];
       if (key) reading.rates[key[0]] += key[1];
     }
+    this.tapped.clear();
     if (this.testing) return [reading, atRest()];
     return this.arm === 0 ? [reading, atRest()] : [atRest(), reading];
   }
 
+  /** Whether the clutch key is held. */
+  get clutch(): boolean {
+    return this.down.has(CLUTCH_KEY);
+  }
+
   clear(): void {
     this.down.clear();
+    this.tapped.clear();
   }
 }

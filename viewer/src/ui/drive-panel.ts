@@ -90,7 +90,7 @@ export class DrivePanel {
 
   /** Whether a clutch is held: the keys of the view are the device's then. */
   get clutched(): boolean {
-    return this.operator.clutched || this.keyboard.read().some((reading) => reading.clutch);
+    return this.operator.clutched || (this.chosen === "keyboard" && this.keyboard.clutch);
   }
 
   /** The panel is shown or hidden; a test runs only while it is seen. */

@@ -25,6 +25,12 @@ export function title(name: string): string {
   return words.charAt(0).toUpperCase() + words.slice(1);
 }
 
+/** A text as a sentence: its first letter is a capital, and it ends with a full stop. */
+export function sentence(text: string): string {
+  const begun = text.charAt(0).toUpperCase() + text.slice(1);
+  return /[.!?]$/.test(begun) ? begun : `${begun}.`;
+}
+
 const UNITS: [ending: string, unit: string][] = [
   ["_rad_s", "rad/s"], ["_m_s", "m/s"], ["_mm", "mm"], ["_nm", "N m"], ["_rad", "rad"], ["_m", "m"], ["_n", "N"], ["_s", "s"],
 ];

@@ -2,7 +2,7 @@
 
 import type { Session } from "../wire/session.ts";
 import { button, el, select, setAttribute, setText } from "./dom.ts";
-import { number, seconds, title } from "./format.ts";
+import { number, seconds, sentence, title } from "./format.ts";
 import { withThresholds } from "./thresholds.ts";
 
 interface Row {
@@ -136,9 +136,8 @@ export class TaskPanel {
     if (document.activeElement !== this.seed && document.activeElement !== this.begin) this.seed.value = String(status.seed);
     if (document.activeElement !== this.policy.input) this.policy.input.value = status.policy;
     const score = status.score === undefined ? "" : ` Score ${number(status.score, 2)}.`;
-    const note = status.note ? `${status.note.charAt(0).toUpperCase()}${status.note.slice(1)}.` : "";
-    if (note) this.say(note, "warn");
-    else if (status.end) this.say(`${status.end.text}${/[.!]$/.test(status.end.text) ? "" : "."}${score}`, status.passed ? "good" : "bad");
+    if (status.note) this.say(sentence(status.note), "warn");
+    else if (status.end) this.say(`${sentence(status.end.text)}${score}`, status.passed ? "good" : "bad");
     else this.say(`Running for ${seconds(status.head_s)} of ${number(status.length_s, 0, "s")}.${score}`, null);
     for (const [arm, actor] of Object.entries(status.actors ?? {})) {
       const cell = this.readings.querySelector(`[data-test="actor-${CSS.escape(arm)}"]`);
