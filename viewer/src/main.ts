@@ -91,6 +91,11 @@ function start(): void {
   session.on("event", (event) => {
     if (event.text) say(sentence(event.text));
   });
+  let noted: string | null = null;
+  session.on("status", ({ note }) => {
+    if (note && note !== noted) say(sentence(note));
+    noted = note ?? null;
+  });
   session.on("hello", (hello) => {
     if (hello.version !== VERSION) say(`The simulator speaks version ${hello.version} of the wire; this page needs ${VERSION}.`, "bad");
     const holder = hello.seats["controls"];

@@ -1,6 +1,7 @@
 /** Starts the browser of the tests: Debian's Chromium, without a window, drawing in software. */
 
 import { existsSync } from "node:fs";
+import { after } from "node:test";
 import { chromium, type Browser, type Page } from "playwright-core";
 
 const PLACES = [process.env["CHROMIUM"], "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
@@ -10,7 +11,22 @@ export function findBrowser(): string | null {
   return PLACES.find((path): path is string => path !== undefined && existsSync(path)) ?? null;
 }
 
-export async function launch(): Promise<Browser> {
+let running: Promise<Browser> | null = null;
+
+/** The browser; the tests of one process share it. */
+export function launch(): Promise<Browser> {
+  return (running ??= begin());
+}
+
+/** Ends the browser. */
+export async function quit(): Promise<void> {
+  await (await running)?.close();
+  running = null;
+}
+
+after(quit);
+
+async function begin(): Promise<Browser> {
   const executablePath = findBrowser();
   if (!executablePath) throw new Error("no Chromium; install it or name it in CHROMIUM");
   const args = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-dev-shm-usage"];

@@ -57,8 +57,8 @@ export async function eventually(look: () => unknown, what: string, limitMs = 10
 }
 
 /** Waits until a look gives a value. */
-export async function expectSoon<T>(look: () => Promise<T>, value: T, what: string): Promise<void> {
-  const end = Date.now() + 10_000;
+export async function expectSoon<T>(look: () => Promise<T>, value: T, what: string, limitMs = 10_000): Promise<void> {
+  const end = Date.now() + limitMs;
   for (;;) {
     const now = await look();
     if (now === value) return;

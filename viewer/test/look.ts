@@ -1,7 +1,7 @@
 /** Saves pictures of the page: `node build/test/look.js ADDRESS|fake FOLDER [TAB]`. */
 
 import { fileURLToPath } from "node:url";
-import { at, launch, openPage } from "./browser.ts";
+import { at, launch, openPage, quit } from "./browser.ts";
 import { FakeServer } from "./fake/server.ts";
 import { tunnel } from "./tunnel.ts";
 
@@ -29,6 +29,6 @@ for (const look of looks) {
   if (errors.length > 0) console.log(look.name, errors);
   await page.context().close();
 }
-await browser.close();
+await quit();
 fake?.close();
 real?.close();

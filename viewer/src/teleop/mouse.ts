@@ -1,6 +1,8 @@
 /** The mouse as a device: drag a tip in the view, turn the wheel for insertion. */
 
 import * as THREE from "three";
+import { Dots } from "../overlays/dots.ts";
+import { armTint, tint } from "../overlays/palette.ts";
 import type { World } from "../scene/world.ts";
 import type { Session } from "../wire/session.ts";
 import { atRest, type Device, type DeviceAxis, type Reading } from "./device.ts";
@@ -31,14 +33,15 @@ export class Mouse implements Device {
     { id: "mouse-up", label: "Height", ends: ["down", "up"], arm: 0, name: "up" },
     { id: "mouse-deeper", label: "Wheel", ends: ["back", "deeper"], arm: 0, name: "deeper" },
   ];
-  /** Whether drags of tips drive arms. */
-  active = false;
+  private readonly marks = new Dots(0.004, 0.8);
   /** The pad on which the axes are tested. */
   readonly tested = atRest();
   private drag: Drag | null = null;
 
   constructor(private readonly world: World, private readonly session: Session, private readonly operator: Operator, private readonly flipped: (axis: string) => boolean) {
     const view = world.canvas.parentElement!;
+    world.scene.add(this.marks.points);
+    world.update.push(() => this.mark());
     view.addEventListener("pointerdown", (event) => this.begin(event), { capture: true });
     view.addEventListener("wheel", (event) => this.wheel(event), { capture: true, passive: false });
     addEventListener("pointermove", (event) => this.moveTo(event));
@@ -48,6 +51,26 @@ export class Mouse implements Device {
     addEventListener("contextmenu", (event) => {
       if (this.drag) event.preventDefault();
     });
+  }
+
+  /** Whether drags of tips drive arms; the tips are marked then. */
+  get active(): boolean {
+    return this.marks.points.visible;
+  }
+
+  set active(on: boolean) {
+    this.marks.points.visible = on;
+    this.world.draw();
+  }
+
+  private mark(): void {
+    if (!this.active) return;
+    const { session } = this;
+    this.marks.set(
+      session.arms.length,
+      (arm, into) => into.set(session.armVector(arm, "tip_x_m", 3)),
+      (arm) => tint(armTint(arm)),
+    );
   }
 
   read(): Reading[] {

@@ -11,7 +11,7 @@ import type { Session } from "../wire/session.ts";
 import { ActionSliders } from "./action-sliders.ts";
 import { beginTest, type AxisTestView } from "./axis-test-view.ts";
 import { button, el, select, setAttribute, setText, slider } from "./dom.ts";
-import { title } from "./format.ts";
+import { number, title } from "./format.ts";
 import { keysOf } from "./key-table.ts";
 import { RecordBox, type RecordAction } from "./record-box.ts";
 import { testPad } from "./test-pad.ts";
@@ -34,6 +34,7 @@ export class DrivePanel {
   private readonly again = button("Test again", "test-again", () => this.testAgain());
   private readonly handBack = button("Hand back to the policy", "hand-back", () => this.operator.handBack());
   private readonly keys = el("div", { class: "keys-table" });
+  private readonly delay = el("output", { "data-test": "latency" }, "–");
   private readonly armChoice: ReturnType<typeof select>;
   private readonly chooser: ReturnType<typeof select>;
   private chosen = "";
@@ -54,7 +55,7 @@ export class DrivePanel {
     );
     const frame = select(
       "Directions of", "frame",
-      [["endoscope", "The endoscope's picture"], ["tool", "The tool"], ["world", "The cell"]],
+      [["endoscope", "Endoscope"], ["tool", "Tool"], ["world", "Cell"]],
       (value) => (this.operator.settings.frame = value as Frame),
     );
     const scale = slider(
@@ -73,13 +74,17 @@ export class DrivePanel {
       this.sliders.root,
       el("h2", {}, "Motion"),
       el("div", { class: "stack" }, this.armChoice.root, frame.root, scale.root),
+      el("div", { class: "line" }, el("span", {}, "Command to picture"), this.delay),
       this.keys,
       el("h2", {}, "Demonstration"),
       this.record.root,
     );
     setInterval(() => this.tick(), 33);
     session.on("hello", () => this.choose(""));
-    session.on("frame", () => this.rumble());
+    session.on("frame", () => {
+      setText(this.delay, number(session.latencyMs, 0, "ms"));
+      this.rumble();
+    });
     session.on("status", () => this.showButtons());
     session.on("seats", () => this.showButtons());
     world.canvas.addEventListener("keydown", (event) => {

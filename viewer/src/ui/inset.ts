@@ -17,11 +17,14 @@ export class Inset {
   private readonly traced = el("img", { alt: "Ray-traced picture", "data-test": "traced", hidden: true });
   private readonly caption = el("figcaption", { "data-test": "camera-caption", hidden: true });
   private readonly trace: HTMLButtonElement;
+  private readonly traceText = el("span");
   private readonly swap: HTMLButtonElement;
   private address: string | null = null;
 
   constructor(private readonly world: World, private readonly cameras: Cameras, private readonly session: Session) {
-    this.trace = button("Ray trace", "ray-trace", () => void this.toggleTraced());
+    this.trace = button("", "ray-trace", () => void this.toggleTraced());
+    this.trace.append(icon("ray"), this.traceText);
+    this.label("Ray trace");
     this.trace.title = "Ask the simulator for the ray-traced picture of this camera";
     this.swap = button("", "swap", () => this.swapViews());
     this.swap.append(icon("expand"));
@@ -97,7 +100,7 @@ export class Inset {
     const camera = this.camera;
     if (!camera) return;
     this.trace.disabled = true;
-    setText(this.trace, "Tracing");
+    this.label("Tracing");
     try {
       const { name: from, width, height } = camera.model;
       const scaled = Math.min(TRACED_WIDTH, width);
@@ -111,16 +114,22 @@ export class Inset {
       this.showTraced(URL.createObjectURL(blob), Number(reply.header["time_s"]));
     } catch (error) {
       this.session.emit("problem", error instanceof Error ? error.message : String(error));
-      setText(this.trace, "Ray trace");
+      this.label("Ray trace");
     }
     this.trace.disabled = false;
+  }
+
+  private label(text: string): void {
+    setText(this.traceText, text);
+    this.trace.setAttribute("aria-label", text);
+    this.trace.setAttribute("aria-pressed", String(text === "Show live"));
   }
 
   private showTraced(address: string | null, time = 0): void {
     if (this.address) URL.revokeObjectURL(this.address);
     this.address = address;
     this.traced.hidden = address === null;
-    setText(this.trace, address ? "Show live" : "Ray trace");
+    this.label(address ? "Show live" : "Ray trace");
     if (address) {
       this.traced.src = address;
       setText(this.caption, `Ray traced at ${time.toFixed(2)} s`);

@@ -73,6 +73,8 @@ export class Session extends Emitter<Events> {
   /** Milliseconds from a command to the frame that shows it, the newest. */
   latencyMs: number | null = null;
   private topology = -1;
+  /** Number of the newest command of each arm that a frame showed. */
+  private readonly shown = new Map<string, number>();
   private readonly columns = new Map<string, number>();
   private readonly channels = new Map<string, number>();
   private subscription: Subscription = {
@@ -244,8 +246,10 @@ export class Session extends Emitter<Events> {
     };
     this.framesReceived += 1;
     this.frameAt = performance.now();
-    for (const command of Object.values(header.commands ?? {})) {
-      if (command) this.latencyMs = this.frameAt - command.time_s * 1000;
+    for (const [arm, command] of Object.entries(header.commands ?? {})) {
+      if (!command || command.seq === this.shown.get(arm)) continue;
+      this.shown.set(arm, command.seq);
+      this.latencyMs = this.frameAt - command.time_s * 1000;
     }
     this.emit("frame", this.frame);
   }

@@ -36,10 +36,7 @@ test("the page", { skip }, async (t) => {
     browser = await launch();
     ({ server, page, errors, close } = await onFake(browser));
   });
-  after(async () => {
-    await close();
-    await browser.close();
-  });
+  after(() => close());
 
   await t.test("comes up: names the scene, is connected, draws", async () => {
     await says(page, "scene-name", /^cell-a$/);

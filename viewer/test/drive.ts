@@ -20,10 +20,7 @@ test("driving", { skip }, async (t) => {
     browser = await launch();
     ({ server, page, errors, close } = await onFake(browser, {}, (page) => page.addInitScript(FAKE_GAMEPAD)));
   });
-  after(async () => {
-    await close();
-    await browser.close();
-  });
+  after(() => close());
 
   const hold = (key: string) => page.keyboard.down(key);
   const letGo = (key: string) => page.keyboard.up(key);

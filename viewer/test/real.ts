@@ -45,7 +45,7 @@ test("on a simulator", { skip }, async (t) => {
     }
   });
   after(async () => {
-    await browser.close();
+    await page.context().close();
     closeTunnel();
     child.kill("SIGTERM");
     rmSync(folder, { recursive: true, force: true });
@@ -78,9 +78,8 @@ test("on a simulator", { skip }, async (t) => {
     }
     await turn(page, "show-rcm", true);
     const crossing = () => inside(page, ({ show }) => (show.drawn["crossings"] as number[])[0] ?? 99);
-    await page.waitForTimeout(300);
     const told = await inside(page, ({ session }) => session.arm(0, "rcm_mm"));
-    assert.ok(Math.abs((await crossing()) - told) < 0.15, `drawn ${await crossing()} mm, told ${told} mm`);
+    await expectSoon(async () => Math.abs((await crossing()) - told) < 0.05, true, `${told} mm of deviation as drawn`);
     await turn(page, "show-rcm", false);
     await at(page, "value").selectOption("stretch");
     await says(page, "legend", /Stretch/);
@@ -89,7 +88,7 @@ test("on a simulator", { skip }, async (t) => {
 
   await t.test("the ray-traced picture of the endoscope", async () => {
     await at(page, "ray-trace").click();
-    await expectSoon(() => at(page, "traced").isVisible(), true, "the picture");
+    await expectSoon(() => at(page, "traced").isVisible(), true, "the picture", 40_000);
     assert.equal(await at(page, "traced").evaluate((img: HTMLImageElement) => img.decode().then(() => img.naturalWidth)), 640);
     await at(page, "ray-trace").click();
   });
