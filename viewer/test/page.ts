@@ -49,9 +49,9 @@ test("the page", { skip }, async (t) => {
     const place = () => inside(page, ({ session }) => session.organs[0]!.positions.slice(600, 603).join());
     const first = await place();
     const pictures = await inside(page, ({ world }) => world.pictures);
-    await until(page, ({ session }) => session.organs[0]!.version > 20, "twenty motions");
+    await until(page, ({ session }) => session.organs[0]!.version > 8, "eight motions");
     assert.notEqual(await place(), first);
-    assert.ok((await inside(page, ({ world }) => world.pictures)) > pictures);
+    await expectSoon(async () => (await inside(page, ({ world }) => world.pictures)) > pictures + 1, true, "pictures are drawn");
   });
 
   await t.test("plays, pauses, steps, begins again with a seed and a policy", async () => {
@@ -176,7 +176,7 @@ test("the page", { skip }, async (t) => {
     assert.notDeepEqual(await eye(), eye0, "orbit");
     assert.deepEqual(await target(), target0);
     await page.mouse.down({ button: "right" });
-    await page.mouse.move(300, 260, { steps: 3 });
+    await page.mouse.move(300, 230, { steps: 3 });
     await page.mouse.up({ button: "right" });
     assert.notDeepEqual(await target(), target0, "pan");
     await at(page, "fly").selectOption("organ:cecum");

@@ -29,6 +29,7 @@ export class TaskPanel {
   private readonly policy = select("Policy", "policy", [], () => undefined);
   private readonly begin = button("Begin again", "begin", () => this.reset());
   private rows: Row[] = [];
+  private known: { seed: number; policy: string } = { seed: 0, policy: "" };
   private cells: { reading: Reading; arm: number; cell: HTMLTableCellElement }[] = [];
 
   constructor(private readonly session: Session) {
@@ -57,7 +58,7 @@ export class TaskPanel {
 
   private fillPolicies(): void {
     const names = this.session.hello?.policies ?? [];
-    this.policy.set(names.map((name) => [name, name === "operator" ? "Operator (you)" : title(name)]));
+    this.policy.set(names.map((name) => [name, name === "operator" ? "Operator (you)" : title(name)]), this.session.status?.policy);
   }
 
   private reset(): void {
@@ -133,8 +134,10 @@ export class TaskPanel {
     const allowed = this.session.has("controls") && status?.phase === "ready";
     for (const control of [this.policy.input, this.seed, this.begin]) control.disabled = !allowed;
     if (status?.phase !== "ready") return;
-    if (document.activeElement !== this.seed && document.activeElement !== this.begin) this.seed.value = String(status.seed);
-    if (document.activeElement !== this.policy.input) this.policy.input.value = status.policy;
+    // What the user chose for the next episode stays until another one begins.
+    if (status.seed !== this.known.seed) this.seed.value = String(status.seed);
+    if (status.policy !== this.known.policy) this.policy.input.value = status.policy;
+    this.known = { seed: status.seed, policy: status.policy };
     const score = status.score === undefined ? "" : ` Score ${number(status.score, 2)}.`;
     if (status.note) this.say(sentence(status.note), "warn");
     else if (status.end) this.say(`${sentence(status.end.text)}${score}`, status.passed ? "good" : "bad");
