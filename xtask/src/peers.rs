@@ -25,7 +25,7 @@ const FOLDER: &str = "target/peers";
 /// specimen A.
 const MESH: &str = "specimen_a";
 /// Rounds of runs.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 3;
 
 type Outcome<T> = Result<T, String>;
 

@@ -34,6 +34,7 @@ pub use episode::run_episode;
 pub use manifest::{Job, Manifest, named_specimen};
 pub use outcomes::{distinct_outcomes, repeats};
 pub use plots::{lift_and_rcm, lifts, success_by_name, success_over};
+pub use policy_server::interpreter;
 pub use policy_spec::PolicySpec;
 pub use store::{EpisodeFiles, EpisodeRecord, Store};
 pub use table::{CampaignResult, Comparison, EndCounts, Interval, PolicyRow, StageCount, Suspensions, median};

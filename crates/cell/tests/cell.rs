@@ -160,6 +160,101 @@ fn every_kind_of_arm_lifts_the_tube_by_actions() {
     }
 }
 
+/// The local model of the tissue predicts the force after a small motion of the tip.
+#[test]
+fn a_haptic_model_predicts_the_force_of_the_next_motion() {
+    let mut cell = Cell::new(&ideal(false), &two_tubes(ONE_END, 2.2e-3), 1).unwrap();
+    grasp_and_lift(&mut cell, "left", HELD, 0.01);
+    let before = cell.haptic_model("left").unwrap();
+    assert!(before.wrench.force.length() > 0.02, "{before:?}");
+    let saved = cell.save();
+    for axis in DVec3::AXES {
+        cell.restore(&saved).unwrap();
+        cell.step(None).unwrap();
+        let before = cell.haptic_model("left").unwrap();
+        let pose = cell.measured_cp("left").unwrap();
+        send(&mut cell, "left", &Pose { translation: pose.translation + 2e-4 * axis, ..pose }, 0.0, 1);
+        let after = cell.haptic_model("left").unwrap();
+        let moved = after.tip.translation - before.tip.translation;
+        assert!(moved.length() > 1e-4, "{moved}");
+        let row = |c: usize| (0..3).map(|k| before.stiffness[c][k] * moved[k]).sum::<f64>();
+        let expected = -DVec3::new(row(0), row(1), row(2));
+        let change = after.wrench.force - before.wrench.force;
+        println!("moved {:.3} mm: {:.4} N, expected {:.4} N", 1e3 * moved, change, expected);
+        // The tube is bent by 20 degrees, and relaxes within the period's second frame.
+        let share = expected.length() / change.length();
+        assert!((0.5..2.0).contains(&share), "{change} N, {expected} N expected");
+        assert!(change.dot(expected) > 0.85 * change.length() * expected.length(), "{change} N, {expected} N expected");
+    }
+    cell.servo_jaw("left", 1.0).unwrap();
+    let back = Pose { translation: before.tip.translation + 0.03 * DVec3::Z, ..before.tip };
+    send(&mut cell, "left", &back, 1.0, 30);
+    assert_eq!(cell.haptic_model("left").unwrap().stiffness, [[0.0; 6]; 6], "away from tissue");
+}
+
+/// Places of the tip of an ideal arm (m) at its start and after each of `count` tip actions of 1 mm
+/// along x, with a delay of `ms`; and the state's hash in the end.
+fn moved_late(ms: f64, count: usize) -> (Vec<DVec3>, u64) {
+    let mut scene = ideal(false);
+    scene.rates.control_delay_ms = ms;
+    let mut cell = Cell::new(&scene, &meshed(ONE_END, 4e-3), 1).unwrap();
+    let action = Action { space: ActionSpace::Tip, numbers: vec![1e-3, 0.0, 0.0, 0.0, 1.0] };
+    let mut places = vec![cell.measured_cp("left").unwrap().translation];
+    for _ in 0..count {
+        cell.step(&action).unwrap();
+        places.push(cell.measured_cp("left").unwrap().translation);
+    }
+    (places, cell.hash())
+}
+
+#[test]
+fn late_actions_move_the_arm_as_much_and_later() {
+    let (at_once, _) = moved_late(0.0, 8);
+    // One and two periods, and a period and a half: halfway between two places of a period's end.
+    for (periods, half, ms) in [(1, false, 1000.0 / 30.0), (2, false, 2000.0 / 30.0), (1, true, 50.0)] {
+        let (late, _) = moved_late(ms, 8);
+        assert!(late[..=periods].iter().all(|p| *p == at_once[0]), "{ms} ms: {late:?}");
+        for k in periods + 1..=8 {
+            let whole = at_once[k - periods];
+            let expected = if half { 0.5 * (whole + at_once[k - periods - 1]) } else { whole };
+            assert!(late[k].distance(expected) < 1e-9, "{ms} ms, period {k}: {} is not {expected}", late[k]);
+        }
+    }
+}
+
+#[test]
+fn waiting_actions_are_part_of_the_state_and_bad_ones_never_wait() {
+    let mut scene = scene();
+    scene.rates.control_delay_ms = 110.0;
+    let specimen = meshed(ONE_END, 4e-3);
+    let action = |x: f64| Action { space: ActionSpace::Tip, numbers: [x, 0.0, 0.0, 0.0, 0.5].repeat(2) };
+    let mut one = Cell::new(&scene, &specimen, 1).unwrap();
+    (0..3).for_each(|k| drop(one.step(&action(1e-3 * f64::from(k))).unwrap()));
+    let saved = one.save();
+    let before = one.hash();
+    assert!(one.step(&action(1.0)).unwrap_err().to_string().contains("left tip x"), "refused when it is given");
+    assert_eq!(one.hash(), before);
+    let go = |cell: &mut Cell| -> Vec<u64> {
+        let one = |_| {
+            cell.step(None).unwrap();
+            cell.hash()
+        };
+        (0..6).map(one).collect()
+    };
+    let first = go(&mut one);
+    let mut other = Cell::new(&scene, &specimen, 2).unwrap();
+    other.restore(&saved).unwrap();
+    assert_eq!((other.hash(), go(&mut other)), (before, first));
+    // A restart forgets them.
+    let starts: Vec<Setpoint> = ARMS.map(|arm| other.setpoint(arm).unwrap()).to_vec();
+    let tip = |cell: &mut Cell| {
+        cell.restart(&saved, &starts).unwrap();
+        (0..6).for_each(|_| drop(cell.step(None).unwrap()));
+        cell.setpoint("left").unwrap()
+    };
+    assert_eq!(tip(&mut other), starts[0]);
+}
+
 /// Brings open jaws to the tube and closes them by `jaws`, an opening a period: the force of the
 /// hold and that of the event (N), if anything is held.
 fn close_by(jaws: impl Iterator<Item = f64>) -> Option<(f64, f64)> {

@@ -2,6 +2,7 @@
 
 mod episode;
 mod evaluate;
+mod export;
 mod render;
 mod scene;
 mod specimens;
@@ -10,6 +11,7 @@ mod task;
 
 pub use episode::*;
 pub use evaluate::*;
+pub use export::*;
 pub use render::*;
 pub use scene::*;
 pub use specimens::*;
@@ -75,6 +77,9 @@ pub enum Command {
     Replay(Replay),
     /// Score stored episodes at other gates, without simulation.
     Sweep(Sweep),
+    /// Write recorded episodes as a dataset of LeRobot or robomimic, rendered now and without
+    /// simulation.
+    Export(Export),
     /// Reproduce a table or figure of the paper, beside the paper's numbers.
     Experiment(Experiment),
     /// Measure speed.

@@ -16,10 +16,12 @@ mod instrument;
 mod organ;
 mod rig;
 mod section;
+mod skins;
 mod solid;
 mod visuals;
 
 pub use camera::OUTSIDE;
 pub use error::{Error, Result};
 pub use rig::{CameraRig, PICTURE_SIDES, SensorNoise};
+pub use skins::{ArmPosture, SkinnedOrgan, Skins};
 pub use trocar_camera::DepthNoise;

@@ -146,6 +146,11 @@ impl OrganSkin {
 }
 
 impl BoundSurface {
+    /// A mesh whose vertices are placed without nodes.
+    pub fn alone(mesh: TriMesh) -> Self {
+        Self { mesh, weights: Vec::new() }
+    }
+
     /// Adds faces between nodes with new vertices, so that their colours do not blend with adjacent
     /// faces.
     fn add(&mut self, faces: &[[u32; 3]], place: &dyn Fn(u32) -> DVec3, color: &dyn Fn(u32) -> [u8; 3]) {

@@ -1,7 +1,7 @@
 //! One body in a frame: its solver, its state on the way through the frame, and what is measured of
 //! it.
 
-use crate::contact::{ContactSet, Members, Pairs, Reaction};
+use crate::contact::{ContactSet, Members, Pairs, Reaction, ToolGroup};
 use crate::frame::Frame;
 use crate::report::Measured;
 use crate::state::BodyState;
@@ -37,6 +37,10 @@ pub(crate) trait Solver: Send + Sync + Sized {
     fn contacts(&self) -> Option<&ContactSet> {
         None
     }
+
+    /// Adds the stiffness of the body against the tools of a group after the last frame, if the
+    /// solver knows it; see [`crate::Stepper::tool_stiffness`].
+    fn add_tool_stiffness(&mut self, _body: &Body, _group: &ToolGroup<'_>, _sum: &mut [[f64; 6]; 6]) {}
 }
 
 /// Bodies that may touch each other, in a frame.

@@ -1,7 +1,7 @@
 //! The solvers of all bodies of a model, behind the stages of a frame.
 
 use crate::body_slot::{BodySlot, IslandFrame, Solver, for_each};
-use crate::contact::{ContactSet, Coupling, Reaction};
+use crate::contact::{ContactSet, Coupling, Reaction, ToolGroup};
 use crate::frame::Frame;
 use crate::island::{Island, Islands, press_tools};
 use crate::report::Divergence;
@@ -38,6 +38,9 @@ pub(crate) trait SolverSet: Send + Sync {
     /// Calls `visit(body, vertex, force)` for every contact force (N) of tools and other bodies on
     /// a vertex at the end of the last frame, which left `state`.
     fn for_contact_forces(&self, state: &State, visit: &mut dyn FnMut(usize, u32, DVec3));
+
+    /// Adds the stiffness of all bodies against the tools of a group after the last frame.
+    fn add_tool_stiffness(&mut self, group: &ToolGroup<'_>, sum: &mut [[f64; 6]; 6]);
 }
 
 /// Makes the solver of a body; the flag says whether the calling thread does all the work.
@@ -155,5 +158,11 @@ impl<S: Solver> SolverSet for BodySolvers<S> {
     fn for_contact_forces(&self, state: &State, visit: &mut dyn FnMut(usize, u32, DVec3)) {
         let x = |body: usize, vertex: u32| state.bodies[body].x[vertex as usize];
         self.islands.for_contact_forces(&self.slots, x, visit);
+    }
+
+    fn add_tool_stiffness(&mut self, group: &ToolGroup<'_>, sum: &mut [[f64; 6]; 6]) {
+        for BodySlot { body, solver, .. } in &mut self.slots {
+            solver.add_tool_stiffness(body, group, sum);
+        }
     }
 }

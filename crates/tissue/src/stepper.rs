@@ -1,5 +1,6 @@
 //! One frame of simulation, stage by stage.
 
+use crate::contact::ToolGroup;
 use crate::descent::TouchingDescent;
 use crate::external::{ExternalSolver, Integrator};
 use crate::frame::Frame;
@@ -169,6 +170,28 @@ impl Stepper {
     /// Forces of tissue on each tool in the last frame, in the order of the motions of the step.
     pub fn forces(&self) -> &[ToolForce] {
         &self.forces
+    }
+
+    /// How the force of tissue on `tools` changes when they move together, as one rigid body: about
+    /// the point `about` (m), the wrench on them (N, N m) changes by minus this matrix times the
+    /// motion (translation (m), rotation vector (rad)) of a frame.
+    ///
+    /// It is linearised at the end of the last frame, which left `state`, with elements as stiff as
+    /// at rest. Masses and dashpots resist the motion: tissue that settles is softer. Left out are
+    /// rigid grasps, and how present forces turn with the tools. It is symmetric, and positive
+    /// semidefinite up to rounding. The cost is six solves a substep for each body that is touched,
+    /// and some ten times as many where tissue slips along the tools. The next frame has the same
+    /// bits with and without it.
+    ///
+    /// Zero with solvers other than [`SolverSettings::QuasiNewton`], which have no matrix.
+    pub fn tool_stiffness(&mut self, model: &Model, state: &State, tools: &[usize], about: DVec3) -> [[f64; 6]; 6] {
+        let mut sum = [[0.0; 6]; 6];
+        if self.solvers.fits(model, state) && state.grasps_fit(model) {
+            let group = ToolGroup { dt: self.dt, tools, about, grasps: &state.grasps, colliders: &model.colliders };
+            self.solvers.add_tool_stiffness(&group, &mut sum);
+        }
+        // Rounding makes it slightly unsymmetric.
+        std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (sum[i][j] + sum[j][i])))
     }
 
     /// Events of grasps in the last frame.

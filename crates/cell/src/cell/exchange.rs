@@ -72,6 +72,11 @@ impl Exchange {
         self.load.force
     }
 
+    /// The stiffness seen so far (N/m).
+    pub fn stiffness(&self) -> f64 {
+        self.stiffness
+    }
+
     /// The load on a tip that has moved to `at` (m).
     pub fn load(&self, at: DVec3) -> Wrench {
         let force = self.load.force - self.stiffness * (at - self.at);

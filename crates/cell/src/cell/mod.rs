@@ -9,9 +9,11 @@ mod arm;
 mod build;
 mod clearance;
 mod crtk;
+mod delay;
 mod drive;
 mod exchange;
 mod figures;
+mod haptic_model;
 mod inside;
 mod link_poses;
 mod period;
@@ -31,6 +33,7 @@ mod workspace;
 pub use action::{Action, ActionSpace};
 pub use exchange::MAX_LOAD;
 pub use figures::Carried;
+pub use haptic_model::HapticModel;
 pub use placed::Placed;
 pub use reach::{REACH_TOLERANCE, ToolReach, tool_reach};
 pub use report::{ArmObservation, CellEvent, CellReport, TaggedForce, TissueObservation};
@@ -44,6 +47,7 @@ pub use workspace::{FreeSpace, PortSpace, Reached, Workspace};
 
 use crate::{Error, Result, World};
 use arm::ArmUnit;
+use delay::{Delay, Waiting};
 use rules::Edges;
 use std::time::Duration;
 use trocar_scene::{SafetyRules, Scene};
@@ -91,6 +95,9 @@ pub struct Cell {
     /// Tissue frames of a control period, and physics steps of the arms in a frame.
     frames: u32,
     physics_steps: u32,
+    /// The control delay, and the actions that wait.
+    delay: Delay,
+    waiting: Waiting,
     /// Whether cuts sever tissue.
     sever: bool,
     /// The safety rules that are applied.
@@ -142,6 +149,8 @@ impl Cell {
             control_hz: scene.rates.control_hz,
             frames,
             physics_steps,
+            delay: Delay::new(1e-3 * scene.rates.control_delay_ms, scene.rates.physics_hz, frames * physics_steps),
+            waiting: Waiting::default(),
             sever: scene.task.sever,
             rules: scene.safety.rules,
             timing: Timing::default(),

@@ -303,7 +303,7 @@ impl QuasiNewtonSolver {
         }
     }
 
-    fn free_node(&self, vertex: u32) -> Option<usize> {
+    pub(super) fn free_node(&self, vertex: u32) -> Option<usize> {
         let i = self.layout.number[vertex as usize] as usize;
         (i < self.layout.free && !self.held[i]).then_some(i)
     }

@@ -5,7 +5,7 @@ use super::tiles::Tiles;
 use crate::Body;
 use crate::assembly::{Stiffness, blocks, shape_gradients, tangent};
 use fearless_simd::{Level, Simd};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3A};
 use trocar_sparse::Cholesky;
 
 /// Stiffness that holds a node where a tool carries it, over the node's own.
@@ -111,6 +111,21 @@ impl Factor {
             panel.inverse(level, inverse);
             let rows = panel.rows().iter().copied();
             tiles.push(panel.first(), width, rows, |r, c| inverse[width * c + r], |r, c| panel.below(r, c));
+        }
+    }
+
+    /// Adds the product of the matrix, without what holds or carries nodes, and `x`; nodes in the
+    /// order of elimination.
+    pub fn multiply(&self, x: impl Fn(usize) -> Vec3A, product: &mut [Vec3A]) {
+        let Self { rank, rest, added, .. } = self;
+        for (row, column, block) in rest.matrix().blocks() {
+            let [i, j] = [row, column].map(|k| rank[k as usize] as usize);
+            product[i] += (*block * x(j).as_dvec3()).as_vec3a();
+            if i == j {
+                product[i] += added[i] * x(i);
+            } else {
+                product[j] += (block.transpose() * x(i).as_dvec3()).as_vec3a();
+            }
         }
     }
 

@@ -65,6 +65,12 @@ impl LowRankUpdate {
         self.usable = false;
     }
 
+    /// What the update adds to a node's stiffness (N/m).
+    pub fn added(&self, node: u32) -> f32 {
+        let known = self.nodes.iter().filter(|(i, _)| self.usable && *i == node);
+        known.map(|(_, stiffness)| stiffness).sum()
+    }
+
     /// Sets the nodes that differ (N/m): first those whose stiffness is taken out of the factor,
     /// with a negative one, then those that get more; each kind ascending. Nodes beyond the
     /// greatest number are left out.

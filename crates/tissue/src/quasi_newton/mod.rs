@@ -34,11 +34,13 @@ mod sleeping;
 mod stress;
 mod system;
 mod tiles;
+mod tool_stiffness;
 mod two_loop;
 mod warp;
 
+use crate::Body;
 use crate::body_slot::{BodySlot, Solver, for_each};
-use crate::contact::ContactSet;
+use crate::contact::{ContactSet, ToolGroup};
 use crate::descent::{BodyDescent, Sweeps, sweep_substep};
 pub(crate) use body_system::QuasiNewtonSolver;
 use history::History;
@@ -86,6 +88,10 @@ impl Solver for QuasiNewtonSolver {
 
     fn contacts(&self) -> Option<&ContactSet> {
         Some(&self.touching.contacts)
+    }
+
+    fn add_tool_stiffness(&mut self, body: &Body, group: &ToolGroup<'_>, sum: &mut [[f64; 6]; 6]) {
+        self.add_stiffness(body, group, sum);
     }
 }
 

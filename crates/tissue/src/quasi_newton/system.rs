@@ -2,7 +2,7 @@
 //! once, turned with the tissue, and updated for contacts. It preconditions the search.
 
 use super::factor::Factor;
-use super::iterate::position;
+use super::iterate::{add, position};
 use super::layout::Layout;
 use super::low_rank_update::LowRankUpdate;
 use super::warp::Warp;
@@ -10,6 +10,7 @@ use crate::Body;
 use crate::contact::{ContactSet, Source};
 use crate::lanes::Row;
 use fearless_simd::{Level, dispatch};
+use glam::{Mat3A, Vec3A};
 
 /// The preconditioner of one body.
 pub(super) struct System {
@@ -140,8 +141,67 @@ impl System {
         });
     }
 
+    /// The mean rotation of the tissue from rest, as the warp has it; `scratch` has a row a node.
+    pub fn mean_rotation(&mut self, level: Level, layout: &Layout, scratch: &mut [Row]) -> Mat3A {
+        let Self { warp, right, .. } = self;
+        let mut inverse = [Vec3A::ZERO; 3];
+        for (c, column) in inverse.iter_mut().enumerate() {
+            scratch.fill([0.0; 4]);
+            scratch.iter_mut().for_each(|row| row[c] = 1.0);
+            dispatch!(level, simd => warp.to_rest(simd, scratch, right));
+            *column = right[..3 * layout.free].chunks_exact(3).fold(Vec3A::ZERO, |sum, v| sum + Vec3A::from_slice(v));
+        }
+        nearest_rotation(Mat3A::from_cols(inverse[0], inverse[1], inverse[2])).transpose()
+    }
+
+    /// x = P^-1 x, P being the stiffness at rest turned by one `rotation`: unlike the warped one, it
+    /// resists no translation of tissue that is bent.
+    pub fn apply_turned(&mut self, level: Level, rotation: &Mat3A, x: &mut [Row]) {
+        let Self { factor, update, right, .. } = self;
+        let Some(factor) = factor else { return };
+        let back = rotation.transpose();
+        for (number, row) in right.chunks_exact_mut(3).zip(x.iter()) {
+            number.copy_from_slice(&(back * position(row)).to_array());
+        }
+        dispatch!(level, simd => {
+            factor.solve(simd, right);
+            update.apply(simd, right);
+        });
+        for (row, number) in x.iter_mut().zip(right.chunks_exact(3)) {
+            let turned = *rotation * Vec3A::from_slice(number);
+            *row = [turned.x, turned.y, turned.z, 0.0];
+        }
+    }
+
+    /// Subtracts the product of the body's matrix without springs, turned by one `rotation`, and `x`.
+    pub fn subtract_product(&self, rotation: &Mat3A, x: &[Row], from: &mut [Row]) {
+        let Some(factor) = &self.factor else { return };
+        let back = rotation.transpose();
+        let mut product = vec![Vec3A::ZERO; x.len()];
+        factor.multiply(|i| back * position(&x[i]), &mut product);
+        for (row, product) in from.iter_mut().zip(&product) {
+            add(row, -(*rotation * *product));
+        }
+    }
+
+    /// The stiffness of the springs of a node in the matrix: those in the factor, and what the update
+    /// adds or takes (N/m).
+    pub fn spring(&self, i: usize) -> f32 {
+        self.holding(i) + self.update.added(i as u32)
+    }
+
     /// The stiffness that holds a held node (N/m).
     pub fn holding(&self, i: usize) -> f32 {
         self.factor.as_ref().map_or(0.0, |factor| factor.holding[i])
     }
+}
+
+/// The rotation nearest to a matrix (Higham 1986, "Computing the polar decomposition": Newton's
+/// iteration). The identity where there is none.
+fn nearest_rotation(matrix: Mat3A) -> Mat3A {
+    let mut x = matrix * (1.0 / matrix.determinant().abs().cbrt().max(f32::MIN_POSITIVE));
+    for _ in 0..20 {
+        x = 0.5 * (x + x.inverse().transpose());
+    }
+    if x.is_finite() && (x.determinant() - 1.0).abs() < 1e-3 { x } else { Mat3A::IDENTITY }
 }

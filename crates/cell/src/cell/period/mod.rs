@@ -1,5 +1,8 @@
 //! The stages of a control period, one module each.
 //!
+//! An action is checked at the start of the period and reaches the arms after the control delay,
+//! which may end within a later period.
+//!
 //! Tissue is stepped 60 times a second, arms 480 times. In a tissue frame the arms move first,
 //! under the tissue's load at the end of the last frame, extrapolated with the tip. Then tissue is
 //! stepped with tools that move from the tips' places at the beginning of the frame to their places
@@ -27,9 +30,9 @@ impl Cell {
     pub fn step<'a>(&mut self, action: impl Into<Option<&'a Action>>) -> Result<CellReport> {
         let clock = Instant::now();
         let mut log = PeriodLog::default();
-        self.command(action.into(), &mut log)?;
-        for _ in 0..self.frames {
-            self.move_arms()?;
+        self.take(action.into())?;
+        for frame in 0..self.frames {
+            self.move_arms(frame, &mut log)?;
             let start = self.begin_tissue_frame();
             let World { model, state, stepper, .. } = &mut self.world;
             let tissue = stepper.step_with_loads(model, state, &self.motions, &[]);
