@@ -22,8 +22,8 @@ WARN_AFTER_S = 20.0
 class Actor:
     """A worker in a process of Ray."""
 
-    def __init__(self, scene: str, plan: str):
-        self.scene, self.plan = scene, plan
+    def __init__(self, scene: str, plan: str, surfaces: bool):
+        self.scene, self.plan, self.surfaces = scene, plan, surfaces
 
     def ready(self, jobs: list[str]) -> None:
         """Builds the worker and loads the policies of `jobs`.
@@ -36,7 +36,10 @@ class Actor:
 
         folder = phantoms_folder()
         folder.mkdir(parents=True, exist_ok=True)
-        self.worker = Worker(self.scene, folder, self.plan, python=sys.executable or None)
+        python = sys.executable or None
+        self.worker = Worker(
+            self.scene, folder, self.plan, python=python, surfaces=self.surfaces
+        )
         self.worker.start(jobs)
 
     def run(self, job: str) -> list[tuple[str, bytes]]:
@@ -51,6 +54,8 @@ def run_on_ray(
     workers: int | None,
     address: str,
     progress: Callable[[int, int], None],
+    *,
+    surfaces: bool = False,
 ) -> None:
     """Runs `jobs` on the cluster at `address`.
 
@@ -71,7 +76,7 @@ def run_on_ray(
             )
             dashboard = False if address == "local" else None
             ray.init(address=address, log_to_driver=False, include_dashboard=dashboard, **options)
-        pool = _ActorPool(ray, campaign, scene, jobs, workers)
+        pool = _ActorPool(ray, campaign, scene, jobs, workers, surfaces)
         try:
             progress(0, len(jobs))
             pool.start_actors()
@@ -100,8 +105,15 @@ class _ActorPool:
     """
 
     def __init__(
-        self, ray: Any, campaign: Campaign, scene: str, jobs: list[str], workers: int | None
+        self,
+        ray: Any,
+        campaign: Campaign,
+        scene: str,
+        jobs: list[str],
+        workers: int | None,
+        surfaces: bool,
     ):
+        self.surfaces = surfaces
         self.ray, self.campaign, self.scene, self.plan = ray, campaign, scene, campaign.plan
         self.actor = ray.remote(num_cpus=1, max_restarts=0)(Actor)
         cpus = int(ray.cluster_resources().get("CPU", 1))
@@ -121,7 +133,7 @@ class _ActorPool:
             self._start_actor(self.jobs if k == 0 else [])
 
     def _start_actor(self, policies_of: list[str]) -> None:
-        actor = self.actor.remote(self.scene, self.plan)
+        actor = self.actor.remote(self.scene, self.plan, self.surfaces)
         self.running[actor.ready.remote(policies_of)] = (actor, None)
 
     def wait(self) -> list[Any]:

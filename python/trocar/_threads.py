@@ -23,13 +23,15 @@ def run_on_threads(
     jobs: list[str],
     workers: int | None,
     progress: Callable[[int, int], None],
+    *,
+    surfaces: bool = False,
 ) -> None:
     """Runs `jobs`. However it ends, finished episodes are kept and no thread keeps running.
 
     ValueError for a scene or policy that cannot be used, OSError for a folder that cannot be
     written.
     """
-    pool = _WorkerPool(campaign, scene, jobs, workers)
+    pool = _WorkerPool(campaign, scene, jobs, workers, surfaces)
     try:
         progress(0, len(jobs))
         pool.build_workers()
@@ -47,10 +49,18 @@ def run_on_threads(
 class _WorkerPool:
     """Workers. Each is built on a thread of the pool and then runs one job after the other."""
 
-    def __init__(self, campaign: Campaign, scene: str, jobs: list[str], workers: int | None):
+    def __init__(
+        self,
+        campaign: Campaign,
+        scene: str,
+        jobs: list[str],
+        workers: int | None,
+        surfaces: bool,
+    ):
         cores = os.cpu_count() or 1
         self.campaign, self.scene, self.plan = campaign, scene, campaign.plan
         self.jobs, self.waiting, self.done = jobs, jobs[::-1], 0
+        self.surfaces = surfaces
         self.count = min(workers or cores, len(jobs))
         self.threads = ThreadPoolExecutor(self.count)
         #: Running tasks: a job and its worker, or None while a worker is built.
@@ -67,7 +77,14 @@ class _WorkerPool:
         with self._builds:
             python = sys.executable or None
             folder = phantoms_folder()
-            worker = Worker(self.scene, folder, self.plan, stop=self._stop, python=python)
+            worker = Worker(
+                self.scene,
+                folder,
+                self.plan,
+                stop=self._stop,
+                python=python,
+                surfaces=self.surfaces,
+            )
         if first:
             # A policy that cannot be loaded is reported at once, not when its first job comes.
             worker.start(self.jobs)

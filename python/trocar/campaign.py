@@ -50,6 +50,7 @@ def run(
     workers: int | None = None,
     ray_address: str | None = None,
     retry_failed: bool = False,
+    surfaces: bool = False,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Runs the missing episodes of the campaign in `output` and returns its `result.json`.
@@ -59,6 +60,7 @@ def run(
       `host:port`; None runs without Ray.
     - `workers`: episodes at once (default: one a CPU).
     - `retry_failed`: episodes whose policy failed run again.
+    - `surfaces`: keeps what pictures are made of, for `trocar.export`.
 
     `$TROCAR_PYTHON`, or else this interpreter, serves `python:...` policies. They are loaded before
     anything is built.
@@ -91,9 +93,11 @@ def run(
     try:
         jobs = campaign.missing(retry_failed)
         if jobs and ray_address is None:
-            run_on_threads(campaign, scene, jobs, workers, progress)
+            run_on_threads(campaign, scene, jobs, workers, progress, surfaces=surfaces)
         elif jobs and ray_address is not None:
-            run_on_ray(campaign, scene, jobs, workers, ray_address, progress)
+            run_on_ray(
+                campaign, scene, jobs, workers, ray_address, progress, surfaces=surfaces
+            )
         result: dict[str, Any] = json.loads(campaign.finish())
     except KeyboardInterrupt:
         # Videos take long; the next run makes them.
@@ -153,6 +157,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--retry-failed", action="store_true", help="run episodes again whose policy failed"
     )
+    parser.add_argument(
+        "--surfaces", action="store_true", help="keep what `trocar export` makes pictures of"
+    )
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
         "--ray", metavar="ADDRESS", help="run on a Ray cluster: auto, local, or host:port"
@@ -196,6 +203,7 @@ def main(arguments: list[str] | None = None) -> int:
             workers=options.workers,
             ray_address=options.ray,
             retry_failed=options.retry_failed,
+            surfaces=options.surfaces,
             progress=show,
         )
     except (ValueError, OSError, RuntimeError, ImportError) as why:

@@ -50,6 +50,8 @@ pub struct Campaign {
     pub jobs: usize,
     /// Runs episodes again whose policy failed.
     pub retry_failed: bool,
+    /// Keep the surfaces of every control period beside each episode.
+    pub surfaces: bool,
     /// Folder of made phantoms. The scene's phantom is made there once and reused.
     pub phantoms: PathBuf,
 }
@@ -139,7 +141,8 @@ impl Campaign {
         let first_error: Mutex<Option<Error>> = Mutex::new(None);
         let servers = Mutex::new(servers);
         let work = |first: bool| -> Result<()> {
-            let mut worker = Worker::new(scene, specimens, manifest.first_seed())?.with_stop_flag(Arc::clone(&stop));
+            let worker = Worker::new(scene, specimens, manifest.first_seed())?;
+            let mut worker = worker.with_stop_flag(Arc::clone(&stop)).with_surfaces(self.surfaces);
             if first {
                 let servers = servers.lock().map(|mut s| std::mem::take(&mut *s)).unwrap_or_default();
                 worker = worker.with_servers(servers);

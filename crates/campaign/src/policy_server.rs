@@ -44,8 +44,8 @@ impl Drop for PolicyServer {
     }
 }
 
-/// The interpreter that serves Python policies: `$TROCAR_PYTHON`, or `preferred`, or `python3`.
-pub(crate) fn interpreter(preferred: Option<&str>) -> String {
+/// The Python interpreter: `$TROCAR_PYTHON`, or `preferred`, or `python3`.
+pub fn interpreter(preferred: Option<&str>) -> String {
     std::env::var("TROCAR_PYTHON").ok().or_else(|| preferred.map(str::to_owned)).unwrap_or_else(|| PYTHON.to_owned())
 }
 

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use trocar_scene::{Split, Variation};
 use trocar_task::{ArmSummary, CHANNELS_FILE, EPISODE_FILE, End, RESULT_FILE, Recording, Summary, read_channels};
-use trocar_workflow::{Error, Result};
+use trocar_workflow::{Error, Result, SURFACES_FILE};
 
 /// The file whose presence makes a folder a campaign.
 const MANIFEST: &str = "campaign.json";
@@ -22,11 +22,11 @@ const LOCK: &str = ".lock";
 pub struct EpisodeFiles(pub Vec<(String, Vec<u8>)>);
 
 impl EpisodeFiles {
-    /// The files of a finished episode.
+    /// The files of a finished episode, with its surfaces if they are kept.
     ///
     /// # Errors
     /// A temporary folder that cannot be written.
-    pub fn of(recording: &Recording) -> Result<Self> {
+    pub fn of(recording: &Recording, surfaces: Option<Vec<u8>>) -> Result<Self> {
         let io = |source| Error::Io { path: std::env::temp_dir(), source };
         let folder = tempfile::tempdir().map_err(io)?;
         recording.write_into(folder.path())?;
@@ -35,7 +35,9 @@ impl EpisodeFiles {
             let path = folder.path().join(name);
             fs::read(&path).map(|bytes| (name.to_owned(), bytes)).map_err(|source| Error::Io { path, source })
         };
-        Ok(Self(names.into_iter().map(read).collect::<Result<_>>()?))
+        let mut files = names.into_iter().map(read).collect::<Result<Vec<_>>>()?;
+        files.extend(surfaces.map(|bytes| (SURFACES_FILE.to_owned(), bytes)));
+        Ok(Self(files))
     }
 }
 
@@ -235,7 +237,7 @@ impl Store {
         let partial = self.folder.join(IN_PROGRESS).join(format!("{}-{:06}", job.policy.name, job.index));
         fs::create_dir_all(&partial).map_err(io(&partial))?;
         for (name, bytes) in &files.0 {
-            if ![EPISODE_FILE, CHANNELS_FILE, RESULT_FILE].contains(&name.as_str()) {
+            if ![EPISODE_FILE, CHANNELS_FILE, RESULT_FILE, SURFACES_FILE].contains(&name.as_str()) {
                 return Err(Error::Mismatch(format!("an episode has no file '{name:.60}'")));
             }
             let path = partial.join(name);

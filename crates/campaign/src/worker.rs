@@ -10,8 +10,8 @@ use std::collections::btree_map::Entry;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trocar_scene::Scene;
-use trocar_task::{Episode, Policy, policy, run};
-use trocar_workflow::{Error, Result, SpecimenCache};
+use trocar_task::{Episode, Policy, policy, run_watched};
+use trocar_workflow::{Error, Result, SpecimenCache, SurfaceWatch};
 
 /// A cell with policies, which runs one job at a time.
 pub struct Worker {
@@ -22,6 +22,7 @@ pub struct Worker {
     python: Option<String>,
     /// Running servers of Python policies, by policy name.
     servers: BTreeMap<String, PolicyServer>,
+    surfaces: bool,
 }
 
 impl Worker {
@@ -32,13 +33,21 @@ impl Worker {
     /// A scene that cannot be built.
     pub fn new(scene: &Scene, specimens: &SpecimenCache, seed: u64) -> Result<Self> {
         let episode = Episode::begun(scene, Box::new(specimens.clone()), 1, seed, scene.draw(seed))?;
-        Ok(Self { episode, policies: BTreeMap::new(), stop: Arc::default(), python: None, servers: BTreeMap::new() })
+        let (policies, servers) = (BTreeMap::new(), BTreeMap::new());
+        Ok(Self { episode, policies, stop: Arc::default(), python: None, servers, surfaces: false })
     }
 
     /// Stops running work when `flag` becomes true.
     #[must_use]
     pub fn with_stop_flag(mut self, flag: Arc<AtomicBool>) -> Self {
         self.stop = flag;
+        self
+    }
+
+    /// Keeps the surfaces of every control period, see [`trocar_workflow::surfaces`].
+    #[must_use]
+    pub fn with_surfaces(mut self, keep: bool) -> Self {
+        self.surfaces = keep;
         self
     }
 
@@ -97,12 +106,16 @@ impl Worker {
     pub fn run_until(&mut self, job: &Job, interrupted: &dyn Fn() -> bool) -> Result<EpisodeFiles> {
         let flag = Arc::clone(&self.stop);
         let stopped = || flag.load(Ordering::Relaxed) || interrupted();
+        let mut surfaces = SurfaceWatch::new(self.surfaces);
         let (episode, policy) = self.policy(&job.policy)?;
-        let recording = run(episode, policy, job.seed, &mut |_| !stopped());
+        let recording = run_watched(episode, policy, job.seed, &mut |episode, step| {
+            surfaces.see(episode, step);
+            !stopped()
+        });
         if stopped() {
             // The stop flag ends a waiting policy like a failure; it is none.
             return Err(Error::Interrupted);
         }
-        EpisodeFiles::of(&recording?)
+        EpisodeFiles::of(&recording?, surfaces.finish()?)
     }
 }

@@ -30,6 +30,7 @@ fn campaign(folder: &Path, policies: &[&str], episodes: usize) -> Campaign {
         by: Vec::new(),
         jobs: 1,
         retry_failed: false,
+        surfaces: false,
         phantoms: folder.join("phantoms"),
     }
 }
@@ -237,6 +238,7 @@ fn one_episode_of_a_server_has_the_same_files_as_any_other_and_a_page() {
         policy: format!("mine={}", server.url()),
         seed: 3,
         variation: None,
+        surfaces: false,
         threads: 1,
         phantoms: dir.path().join("phantoms"),
     };
@@ -272,6 +274,7 @@ fn an_episode_without_its_policy_leaves_nothing() {
             policy: policy.to_owned(),
             seed: 0,
             variation: None,
+            surfaces: false,
             threads: 1,
             phantoms: dir.path().into(),
         };

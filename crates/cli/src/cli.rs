@@ -2,19 +2,23 @@
 
 mod episode;
 mod evaluate;
+mod export;
 mod render;
 mod scene;
 mod specimens;
 mod study;
 mod task;
+mod view;
 
 pub use episode::*;
 pub use evaluate::*;
+pub use export::*;
 pub use render::*;
 pub use scene::*;
 pub use specimens::*;
 pub use study::*;
 pub use task::*;
+pub use view::*;
 pub use trocar_studies::names::{BackName, DesignName, MesherName, SensorName, SolverName, Units};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -75,6 +79,12 @@ pub enum Command {
     Replay(Replay),
     /// Score stored episodes at other gates, without simulation.
     Sweep(Sweep),
+    /// Write recorded episodes as a dataset of LeRobot or robomimic, rendered now and without
+    /// simulation.
+    Export(Export),
+    /// Watch a scene, specimen, episode or campaign in the browser while it runs, and take the
+    /// instruments in hand.
+    View(View),
     /// Reproduce a table or figure of the paper, beside the paper's numbers.
     Experiment(Experiment),
     /// Measure speed.

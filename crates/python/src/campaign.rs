@@ -160,8 +160,9 @@ fn check_stop(stop: &AtomicBool) -> PyResult<()> {
 impl Worker {
     /// Builds the cell of `scene`, which must be that of the manifest `plan`. `stop` stops its
     /// work. `python` serves `python:` policies, unless `$TROCAR_PYTHON` names another interpreter.
+    /// `surfaces` keeps those of every control period.
     #[new]
-    #[pyo3(signature = (scene, phantoms, plan, *, stop=None, python=None))]
+    #[pyo3(signature = (scene, phantoms, plan, *, stop=None, python=None, surfaces=false))]
     fn new(
         py: Python<'_>,
         scene: &str,
@@ -169,6 +170,7 @@ impl Worker {
         plan: &str,
         stop: Option<&Stop>,
         python: Option<String>,
+        surfaces: bool,
     ) -> PyResult<Self> {
         let stop = stop.map(|s| Arc::clone(&s.0)).unwrap_or_default();
         let manifest: Manifest = serde_json::from_str(plan).map_err(|e| wrong(format!("plan: {e}")))?;
@@ -185,7 +187,7 @@ impl Worker {
             }
             check_stop(&stop)?;
             let worker = trocar_campaign::Worker::new(&scene, &specimens, manifest.first_seed()).map_err(|e| evaluate(&e))?;
-            let worker = Mutex::new(worker.with_stop_flag(Arc::clone(&stop)).with_python(python));
+            let worker = Mutex::new(worker.with_stop_flag(Arc::clone(&stop)).with_python(python).with_surfaces(surfaces));
             Ok(Self { worker, stop })
         })
     }

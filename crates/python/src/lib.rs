@@ -15,6 +15,7 @@ mod pictures;
 mod policy;
 mod prepare;
 mod progress;
+mod recorded;
 
 use pyo3::prelude::*;
 
@@ -28,6 +29,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<campaign::Campaign>()?;
     module.add_class::<campaign::Stop>()?;
     module.add_class::<campaign::Worker>()?;
+    module.add_class::<recorded::Recorded>()?;
     module.add_function(wrap_pyfunction!(pictures::cameras, module)?)?;
     module.add_function(wrap_pyfunction!(policy::policies, module)?)?;
     module.add_function(wrap_pyfunction!(prepare::scenes, module)?)?;

@@ -1,19 +1,19 @@
 //! The stage of a cell: organs, their surroundings, arms and instruments, updated from the cell.
 
-use crate::camera::is_endoscope;
-use crate::field::{Field, Recorded};
 use crate::instrument::Shapes;
-use crate::organ::{BoundSurface, OrganSkin, Piece};
+use crate::looks::{glossed, housing, polished, shell, wet};
 use crate::section::section;
-use crate::{Error, Result, arm, furniture};
+use crate::skins::{ArmPosture, Skins};
+use crate::surroundings::surroundings;
+use crate::{Result, arm};
 use glam::DVec3;
 use std::path::PathBuf;
 use std::sync::Arc;
 use trocar_cell::Cell;
 use trocar_core::Pose;
 use trocar_geometry::TriMesh;
-use trocar_render::{Appearance, BodyId, ShapeId, Stage, SurfaceKind};
-use trocar_scene::{Imaging, InstrumentKind, Scene};
+use trocar_render::{Appearance, BodyId, ShapeId, Stage};
+use trocar_scene::{Imaging, Scene};
 use trocar_specimen::Specimen;
 
 /// First labels of instruments, arms, and other objects. Labels of organs start at 1.
@@ -30,25 +30,18 @@ pub(crate) struct CellStage {
     pub labels: Vec<(u16, String)>,
     /// The stage without the organs.
     base: Stage,
+    skins: Skins,
     organs: Vec<OrganOnStage>,
     arms: Vec<Arm>,
     section: Option<(DVec3, DVec3)>,
     imaging: Imaging,
 }
 
+/// What is on the stage of an organ.
 #[derive(Clone)]
 struct OrganOnStage {
-    recorded: Arc<OrganSkin>,
     label: u16,
-    surface: Arc<BoundSurface>,
     shape: Option<ShapeId>,
-    /// Bodies of the cell that are pieces of this organ, and their elements.
-    bodies: Vec<usize>,
-    tets: Vec<Vec<[u32; 4]>>,
-    nodes: Vec<DVec3>,
-    /// Nodes when the stage was last updated.
-    drawn_nodes: Vec<DVec3>,
-    skin: Vec<DVec3>,
 }
 
 #[derive(Clone)]
@@ -82,6 +75,7 @@ impl CellStage {
             labels: Vec::new(),
             base: Stage::new(),
             stage: Stage::new(),
+            skins: Skins::placed(placed),
             organs: Vec::new(),
             arms: Vec::new(),
             section: None,
@@ -90,37 +84,9 @@ impl CellStage {
         for (k, organ) in placed.organs.iter().enumerate() {
             let label = 1 + k as u16;
             all.labels.push((label, organ.name.clone()));
-            let recorded = OrganSkin::new(organ);
-            let surface = recorded.whole_surface();
-            let nodes = recorded.body.vertices.clone();
-            let bodies = Vec::new();
-            all.organs.push(OrganOnStage {
-                recorded: Arc::new(recorded),
-                label,
-                surface: Arc::new(surface),
-                shape: None,
-                bodies,
-                tets: Vec::new(),
-                nodes,
-                drawn_nodes: Vec::new(),
-                skin: Vec::new(),
-            });
+            all.organs.push(OrganOnStage { label, shape: None });
         }
-        let surfaces: Vec<&TriMesh> = placed.organs.iter().map(|o| &o.surface).collect();
-        let recorded = match (&placed.background, &placed.camera) {
-            (Some(picture), Some(camera)) => Some(Recorded { picture, camera, pose: recording }),
-            _ => None,
-        };
-        let field = Field::under(&surfaces, recorded.as_ref())?;
-        all.add("field", &field.mesh, &wet(0.36))?;
-        let ports = scene.map_or(&[][..], |s| &s.ports);
-        let mut pieces = furniture::room(&field, ports);
-        for (scene, camera) in scene.iter().flat_map(|s| s.cameras.iter().map(move |c| (s, c))) {
-            if is_endoscope(camera) {
-                pieces.extend(furniture::scope(&camera.shaft(&scene.placement), furniture::table(&field)));
-            }
-        }
-        for piece in pieces {
+        for piece in surroundings(placed, recording, scene)? {
             all.add(piece.name, &piece.mesh, &piece.appearance)?;
         }
         Ok(all)
@@ -147,18 +113,12 @@ impl CellStage {
         k: usize,
         (scene, arm): (&Scene, &trocar_scene::Arm),
         held: &trocar_scene::Instrument,
-        cell: &Cell,
+        (model, posture): (&str, &ArmPosture),
     ) -> Result<()> {
-        let name = arm.name.name();
-        let poses = cell.link_poses(name)?;
+        let (name, poses) = (arm.name.name(), &posture.links);
         let label = ARMS + k as u16;
         self.labels.push((label, format!("{name} arm")));
-        let shell = Appearance {
-            color: [232; 3],
-            surface: SurfaceKind::Coated { roughness: 0.42, ior: 1.48, scattering_length: [0.0; 3] },
-        };
         // Arms with the same description share their shapes.
-        let model = cell.arm_model(name)?;
         let drawn = arm.drawn().map(|file| ShapeSource {
             file: scene.resolve(file),
             flange: arm.flange.clone(),
@@ -170,33 +130,31 @@ impl CellStage {
         let shapes = match known {
             Some(shapes) => shapes,
             None => {
-                let meshes = arm::links(scene, arm, model, &poses)?;
+                let meshes = arm::links(scene, arm, model, poses)?;
                 meshes.iter().map(|mesh| self.base.add_shape(mesh)).collect::<std::result::Result<Vec<_>, _>>()?
             }
         };
         let mut links = Vec::new();
-        for (shape, pose) in shapes.iter().zip(&poses) {
-            links.push(self.base.add_body(*shape, pose, label, &shell)?);
+        for (shape, pose) in shapes.iter().zip(poses) {
+            links.push(self.base.add_body(*shape, pose, label, &shell())?);
         }
         let held_shapes = Shapes::of(held);
         let label = INSTRUMENTS + k as u16;
         self.labels.push((label, held.name.clone()));
-        let polished = Appearance { surface: SurfaceKind::Metal { roughness: 0.3 }, ..Appearance::steel() };
-        let dark = Appearance { color: [58, 61, 66], ..shell };
         let mut body = |mesh: &TriMesh, appearance: &Appearance| -> Result<BodyId> {
             let shape = self.base.add_shape(mesh)?;
             Ok(self.base.add_body(shape, &Pose::IDENTITY, label, appearance)?)
         };
-        let shaft = body(&held_shapes.shaft, &polished)?;
-        let motor = body(&held_shapes.motor, if held.kind == InstrumentKind::Grasper { &dark } else { &shell })?;
-        let blades = [body(&held_shapes.blades[0], &polished)?, body(&held_shapes.blades[1], &polished)?];
+        let shaft = body(&held_shapes.shaft, &polished())?;
+        let motor = body(&held_shapes.motor, &housing(held.kind))?;
+        let blades = [body(&held_shapes.blades[0], &polished())?, body(&held_shapes.blades[1], &polished())?];
         self.arms.push(Arm { name, drawn, shapes, links, shaft, motor, blades });
         Ok(())
     }
 
     /// Mean position of the organs' nodes at rest (m).
     pub fn organs_middle(&self) -> DVec3 {
-        let all = self.organs.iter().flat_map(|o| &o.recorded.body.vertices);
+        let all = self.skins.organs().iter().flat_map(|o| o.rest());
         let (sum, n) = all.fold((DVec3::ZERO, 0_usize), |(sum, n), p| (sum + *p, n + 1));
         sum / n.max(1) as f64
     }
@@ -219,86 +177,57 @@ impl CellStage {
 
     /// Updates the stage to the current state of the cell.
     pub fn update(&mut self, cell: &Cell) -> Result<()> {
-        let world = cell.world();
-        let bodies = world.model.bodies();
-        let mut same = true;
-        for organ in &mut self.organs {
-            let name = organ.recorded.name.as_str();
-            let of = |b: &str| b.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-            let is_same = organ.shape.is_some()
-                && bodies.iter().filter(|b| of(b.name())).count() == organ.bodies.len()
-                && organ
-                    .bodies
-                    .iter()
-                    .zip(&organ.tets)
-                    .all(|(b, tets)| bodies.get(*b).is_some_and(|b| of(b.name()) && b.tets() == tets));
-            if !is_same {
-                same = false;
-                organ.bodies = (0..bodies.len()).filter(|b| of(bodies[*b].name())).collect();
-                organ.tets = organ.bodies.iter().map(|b| bodies[*b].tets().to_vec()).collect();
-                let pieces: Vec<Piece<'_>> = organ
-                    .bodies
-                    .iter()
-                    .map(|b| Piece { rest: bodies[*b].rest_positions(), tets: bodies[*b].tets() })
-                    .collect();
-                let whole = pieces.len() == 1 && pieces[0].tets == organ.recorded.body.tets;
-                let surface = if whole {
-                    Some(organ.recorded.whole_surface())
-                } else {
-                    organ.recorded.surface_of_pieces(&pieces)
-                };
-                let surface =
-                    surface.ok_or_else(|| Error::Mismatch(format!("organ '{name}' has different elements")))?;
-                organ.surface = Arc::new(surface);
-            }
-            organ.nodes.clear();
-            for b in &organ.bodies {
-                organ.nodes.extend((0..bodies[*b].len()).map(|i| world.state.position(&world.model, *b, i)));
-            }
-        }
-        if same && self.section.is_none() {
-            for organ in &mut self.organs {
-                if organ.nodes == organ.drawn_nodes {
-                    continue;
-                }
-                organ.surface.positions(&organ.nodes, &mut organ.skin);
+        let same = self.skins.update(cell)?;
+        let arms: Vec<ArmPosture> = self.arms.iter().map(|a| ArmPosture::of(cell, a.name)).collect::<Result<_>>()?;
+        self.place(same, &arms)
+    }
+
+    /// Updates the stage to recorded surfaces and arms.
+    pub fn show(
+        &mut self,
+        shown: &[(Arc<TriMesh>, Vec<DVec3>)],
+        other_meshes: bool,
+        arms: &[ArmPosture],
+    ) -> Result<()> {
+        self.skins.show(shown, other_meshes)?;
+        self.place(!other_meshes, arms)
+    }
+
+    /// Puts the surfaces and the arms on the stage. `same`: the meshes are those on it.
+    fn place(&mut self, same: bool, arms: &[ArmPosture]) -> Result<()> {
+        if same && self.section.is_none() && self.organs.iter().all(|o| o.shape.is_some()) {
+            for (organ, skin) in self.organs.iter().zip(self.skins.organs()).filter(|(_, skin)| skin.moved()) {
                 if let Some(shape) = organ.shape {
-                    self.stage.deform(shape, &organ.skin)?;
+                    self.stage.deform(shape, skin.positions())?;
                 }
-                organ.drawn_nodes.clone_from(&organ.nodes);
             }
-            self.pose_arms(cell)
         } else {
             self.rebuild()?;
-            self.pose_arms(cell)
         }
+        self.pose_arms(arms)
     }
 
     /// Rebuilds the stage: the static part, which is shared, and the organs.
     pub fn rebuild(&mut self) -> Result<()> {
         self.stage = self.base.clone();
-        for organ in &mut self.organs {
-            organ.surface.positions(&organ.nodes, &mut organ.skin);
-            let mut mesh = organ.surface.mesh.clone();
-            mesh.vertices.clone_from(&organ.skin);
-            let in_one = organ.nodes.len() == organ.recorded.body.vertices.len();
-            if let Some((point, normal)) = self.section.filter(|_| in_one) {
-                mesh = section(&organ.recorded, &organ.skin, &organ.nodes, point, normal);
+        for (organ, skin) in self.organs.iter_mut().zip(self.skins.organs()) {
+            let mut mesh = TriMesh { vertices: skin.positions().to_vec(), ..skin.mesh().clone() };
+            if let Some(((point, normal), (whole, nodes))) = self.section.zip(skin.whole()) {
+                mesh = section(whole, skin.positions(), nodes, point, normal);
             }
             tint(&mut mesh, self.imaging.tint);
             let (shape, _) = self.stage.add_mesh(&mesh, organ.label, &glossed(wet(0.3), self.imaging.gloss))?;
             organ.shape = Some(shape);
-            organ.drawn_nodes.clone_from(&organ.nodes);
         }
         Ok(())
     }
 
-    fn pose_arms(&mut self, cell: &Cell) -> Result<()> {
-        for arm in &self.arms {
-            for (body, pose) in arm.links.iter().zip(cell.link_poses(arm.name)?) {
-                self.stage.place(*body, &pose)?;
+    fn pose_arms(&mut self, arms: &[ArmPosture]) -> Result<()> {
+        for (arm, posture) in self.arms.iter().zip(arms) {
+            for (body, pose) in arm.links.iter().zip(&posture.links) {
+                self.stage.place(*body, pose)?;
             }
-            let gripper = cell.gripper(arm.name)?;
+            let gripper = &posture.gripper;
             self.stage.place(arm.shaft, &gripper.pose)?;
             self.stage.place(arm.motor, &gripper.pose)?;
             for (body, side) in arm.blades.iter().zip([1.0, -1.0]) {
@@ -309,37 +238,11 @@ impl CellStage {
     }
 }
 
-/// Wet tissue with the given roughness of its film of water.
-fn wet(roughness: f32) -> Appearance {
-    let tissue = Appearance::tissue([190, 96, 88]);
-    match tissue.surface {
-        SurfaceKind::Coated { ior, scattering_length, .. } => {
-            Appearance { surface: SurfaceKind::Coated { roughness, ior, scattering_length }, ..tissue }
-        }
-        _ => tissue,
-    }
-}
-
 /// Scales the colour channels of a surface. Factors of 1 keep every bit.
 fn tint(mesh: &mut TriMesh, factors: [f64; 3]) {
     for color in &mut mesh.colors {
         for (channel, factor) in color.iter_mut().zip(factors) {
             *channel = (f64::from(*channel) * factor).round().clamp(0.0, 255.0) as u8;
         }
-    }
-}
-
-/// The appearance with its highlights scaled by `gloss`: the coat's refractive index for which the
-/// reflectance at normal incidence, ((n - 1) / (n + 1))^2, is scaled so. A factor of 1 keeps every
-/// bit.
-fn glossed(appearance: Appearance, gloss: f64) -> Appearance {
-    match appearance.surface {
-        SurfaceKind::Coated { roughness, ior, scattering_length } if gloss != 1.0 => {
-            let n = f64::from(ior);
-            let root = ((n - 1.0) / (n + 1.0) * gloss.sqrt()).min(0.5);
-            let ior = ((1.0 + root) / (1.0 - root)) as f32;
-            Appearance { surface: SurfaceKind::Coated { roughness, ior, scattering_length }, ..appearance }
-        }
-        _ => appearance,
     }
 }

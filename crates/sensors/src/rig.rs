@@ -2,11 +2,14 @@
 
 use crate::camera::{RigCamera, Room};
 use crate::cell_stage::CellStage;
+use crate::skins::ArmPosture;
 use crate::{Error, OUTSIDE, Result};
 use glam::{DQuat, DVec3};
+use std::sync::Arc;
 use trocar_camera::{Camera, DepthNoise};
 use trocar_cell::{Cell, Placed};
 use trocar_core::Pose;
+use trocar_geometry::TriMesh;
 use trocar_render::{Noise, Picture, RenderSettings, render_into};
 use trocar_scene::{Scene, Start, Task};
 use trocar_specimen::Specimen;
@@ -66,6 +69,19 @@ impl CameraRig {
     /// A camera uses the lens of a recording that the specimen does not have, or the cell belongs
     /// to another scene.
     pub fn new(scene: &Scene, specimen: &Specimen, cell: &Cell) -> Result<Self> {
+        let arm = |side: &str| Ok((cell.arm_model(side)?.to_owned(), ArmPosture::of(cell, side)?));
+        let sides = scene.tools().into_iter().map(|tool| tool.arm.name.name());
+        let mut made = Self::without_cell(scene, specimen, &sides.map(arm).collect::<Result<Vec<_>>>()?)?;
+        made.visible.update(cell)?;
+        Ok(made)
+    }
+
+    /// Builds the cameras of `scene` for recorded surfaces, see [`show`](Self::show). `arms` has the
+    /// model and a posture of each arm.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn without_cell(scene: &Scene, specimen: &Specimen, arms: &[(String, ArmPosture)]) -> Result<Self> {
         let placed = Placed::new(scene, specimen)?.specimen;
         let mut visible = CellStage::new(&placed, scene.placement.pose(), Some(scene))?;
         // Lights depend on the recorded pose of the organs, so that pictures do not depend on the
@@ -73,11 +89,10 @@ impl CameraRig {
         visible.rebuild()?;
         let room = Room { middle: middle(&placed) };
         let cameras = RigCamera::all(scene, specimen.camera.as_ref(), room, &mut visible.stage)?;
-        for (k, tool) in scene.tools().iter().enumerate() {
-            visible.add_arm(k, (scene, tool.arm), tool.instrument, cell)?;
+        for (k, (tool, (model, posture))) in scene.tools().iter().zip(arms).enumerate() {
+            visible.add_arm(k, (scene, tool.arm), tool.instrument, (model, posture))?;
         }
         visible.invalidate();
-        visible.update(cell)?;
         let scene = Some(Box::new(drawn_part(scene)));
         Ok(Self { scene, ..Self::with(visible, cameras) })
     }
@@ -134,6 +149,21 @@ impl CameraRig {
     /// The cell belongs to another scene.
     pub fn update(&mut self, cell: &Cell) -> Result<()> {
         self.visible.update(cell)
+    }
+
+    /// Updates the stage to recorded surfaces and arms, which [`render_still`](Self::render_still)
+    /// shows. `organs` has for each organ of the specimen its mesh and the positions of its
+    /// vertices (m); `other_meshes`: the meshes are not those of the last call.
+    ///
+    /// # Errors
+    /// Another number of organs or of positions.
+    pub fn show(
+        &mut self,
+        organs: &[(Arc<TriMesh>, Vec<DVec3>)],
+        other_meshes: bool,
+        arms: &[ArmPosture],
+    ) -> Result<()> {
+        self.visible.show(organs, other_meshes, arms)
     }
 
     /// Names of the cameras: those of the scene first.

@@ -5,6 +5,7 @@ use crate::phantoms::scene_specimen;
 use crate::reconstruct::{REPORT, refuse_overlap};
 use crate::recorder::Recorder;
 use crate::specimen_cache::{SpecimenCache, drawn_specimens};
+use crate::surfaces::{SURFACES_FILE, SurfaceWatch};
 use crate::{Error, Result, check_interrupted};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -30,6 +31,8 @@ pub struct EpisodeRun {
     pub seed: u64,
     /// The set of factors that vary, instead of the scene's.
     pub variation: Option<VariationSet>,
+    /// Keep the surfaces of every control period, see [`crate::surfaces`].
+    pub surfaces: bool,
     /// Worker threads, 0 for all.
     pub threads: usize,
     /// Folder of made phantoms. The scene's phantom is made there once and reused.
@@ -95,17 +98,23 @@ impl EpisodeRun {
         let mut chosen = make(&episode)?;
         let rig = CameraRig::new(episode.arranged_scene(), episode.specimen(), episode.cell())?;
         let mut recorder = Recorder::new(rig).stills_only();
+        let mut surfaces = SurfaceWatch::new(self.surfaces);
         let periods = scene.task.episode_s / episode.cell().period();
         progress.begin("episode", periods.round() as u64);
         let clock = Instant::now();
         let recording = run_watched(&mut episode, chosen.as_mut(), self.seed, &mut |episode, step| {
             recorder.record(episode, step);
+            surfaces.see(episode, step);
             progress.advance(u64::from(step.is_some()));
             !progress.interrupted()
         })?;
-        let wall_s = (clock.elapsed() - recorder.spent()).as_secs_f64();
+        let wall_s = (clock.elapsed() - recorder.spent() - surfaces.spent()).as_secs_f64();
         progress.end();
         let pictures = recorder.finish(episode.cell())?;
+        if let Some(bytes) = surfaces.finish()? {
+            let path = staged.path().join(SURFACES_FILE);
+            std::fs::write(&path, bytes).map_err(|source| Error::Io { path, source })?;
+        }
         recording.write_into(staged.path())?;
         let real_time_factor = recording.summary.duration_s / wall_s.max(1e-9);
         let page = pages::episode(&recording, &pictures, real_time_factor)?;

@@ -19,6 +19,7 @@ mod segment;
 mod solvers;
 mod specimen_cache;
 pub mod specimen_scene;
+pub mod surfaces;
 pub mod truth;
 pub mod video;
 
@@ -37,6 +38,7 @@ pub use rendering::{Rendered, Rendering, ScriptedLift, VisibleObject};
 pub use segment::{Segment, Segmented, WeightFile, weight_files};
 pub use solvers::{SOLVERS, solver_named};
 pub use specimen_cache::{SpecimenCache, drawn_specimens};
+pub use surfaces::{RecordedEpisode, SURFACES_FILE, SurfaceRecorder, SurfaceWatch};
 pub use trocar_task::{Header as EpisodeHeader, SweepRow};
 pub use truth::TruthFigures;
 

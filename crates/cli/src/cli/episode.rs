@@ -19,6 +19,10 @@ pub struct Episode {
     /// default as the scene says. Factors that the scene itself names vary as it says.
     #[arg(long, value_name = "SET", value_parser = super::variation_set)]
     pub variation: Option<VariationSet>,
+    /// Keep what pictures are made of at every control period (surfaces.trocar), so that `trocar
+    /// export` renders later without simulation.
+    #[arg(long)]
+    pub surfaces: bool,
     /// Worker threads; all by default. The result does not depend on them.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,

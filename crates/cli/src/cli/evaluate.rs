@@ -42,6 +42,10 @@ pub struct Evaluate {
     /// Run episodes again in which the policy failed.
     #[arg(long)]
     pub retry_failed: bool,
+    /// Keep what pictures are made of at every control period (surfaces.trocar), so that `trocar
+    /// export` renders later without simulation.
+    #[arg(long)]
+    pub surfaces: bool,
     /// Folder of phantoms; the scene's phantom is made there once and reused
     /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
     #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]

@@ -54,7 +54,8 @@ pub struct Render {
     pub specimen: Option<PathBuf>,
 }
 
-fn size(text: &str) -> Result<[usize; 2], String> {
+/// Width and height of pictures, for the command line.
+pub fn size(text: &str) -> Result<[usize; 2], String> {
     let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     sides
         .filter(|s| s.iter().all(|n| (8..=8192).contains(n)))

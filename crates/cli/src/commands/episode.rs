@@ -18,6 +18,7 @@ pub fn run(arguments: &cli::Episode, json: bool, progress: &dyn Progress) -> Res
         policy: arguments.policy.clone(),
         seed: arguments.seed,
         variation: arguments.variation,
+        surfaces: arguments.surfaces,
         threads: arguments.threads,
         phantoms: arguments.phantoms.clone(),
     };

@@ -20,6 +20,7 @@ pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Re
         by: arguments.by.clone(),
         jobs: arguments.jobs,
         retry_failed: arguments.retry_failed,
+        surfaces: arguments.surfaces,
         phantoms: arguments.phantoms.clone(),
     };
     note_reach(&arguments.scene);

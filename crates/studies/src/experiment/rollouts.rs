@@ -137,6 +137,7 @@ impl Study for RolloutsExperiment {
             by: Vec::new(),
             jobs: self.jobs,
             retry_failed: false,
+            surfaces: false,
             phantoms: self.scene.phantoms.clone(),
         };
         let (store, manifest, by) = campaign.run_episodes(job.output(), Some(self.rollouts), job.progress)?;

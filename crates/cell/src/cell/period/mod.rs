@@ -15,7 +15,7 @@ use super::Cell;
 use super::action::Action;
 use super::report::{CellReport, PeriodLog};
 use crate::{Result, World};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 impl Cell {
     /// Steps the cell by one control period. Without an action (`None`) the arms continue towards
@@ -25,10 +25,28 @@ impl Cell {
     /// An action with an error is refused with the number's index and name; nothing has changed
     /// then. If the numbers of an arm are no longer finite, a state has to be restored.
     pub fn step<'a>(&mut self, action: impl Into<Option<&'a Action>>) -> Result<CellReport> {
-        let clock = Instant::now();
+        self.step_watched(action, &mut |_| {})
+    }
+
+    /// The same with a `watch` that sees the cell after each tissue frame but the last.
+    ///
+    /// # Errors
+    /// As [`step`](Self::step).
+    pub fn step_watched<'a>(
+        &mut self,
+        action: impl Into<Option<&'a Action>>,
+        watch: &mut dyn FnMut(&Self),
+    ) -> Result<CellReport> {
+        let (mut clock, mut wall) = (Instant::now(), Duration::ZERO);
         let mut log = PeriodLog::default();
         self.command(action.into(), &mut log)?;
-        for _ in 0..self.frames {
+        for frame in 0..self.frames {
+            if frame > 0 {
+                // The time of whoever watches is not the cell's.
+                wall += clock.elapsed();
+                watch(self);
+                clock = Instant::now();
+            }
             self.move_arms()?;
             let start = self.begin_tissue_frame();
             let World { model, state, stepper, .. } = &mut self.world;
@@ -39,7 +57,7 @@ impl Cell {
         }
         self.periods += 1;
         let report = self.observe_period(log);
-        self.timing.all += clock.elapsed();
+        self.timing.all += wall + clock.elapsed();
         Ok(report)
     }
 }
