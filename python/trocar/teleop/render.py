@@ -154,9 +154,9 @@ class Renderer:
             lag[:3] = (model.setpoint[0] - model.position) / self.scale
             lag[3:] = between(model.rotation, model.setpoint[1])
         if self._bias is None:
-            self._bias = lag.copy()
+            self._bias = lag
         share = min(1.0, min(self._age, LIFE_S) / BIAS_S)
-        self._bias += share * (lag - self._bias)
+        self._bias = self._bias + share * (lag - self._bias)
         self._at, self._lag = commanded, lag - self._bias
         # In lengths of the hand.
         self._force = ratio * size * model.wrench
@@ -164,7 +164,7 @@ class Renderer:
         self._stiffness = stiffness
         self._series = self._coupled(stiffness)
         least = np.repeat(LEAST_STIFFNESS, 3)
-        self._stores = np.linalg.inv(stiffness + np.diag(least))
+        self._stores = np.asarray(np.linalg.inv(stiffness + np.diag(least)))
         self._age = 0.0
 
     def _coupled(self, stiffness: Array) -> Array:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .coupling import Coupling, DeviceProperties
+from .loop import DeviceState
 from .render import LocalModel, Renderer
 from .rotation import IDENTITY, Array, between, from_vector
 
@@ -109,6 +110,37 @@ class SimulatedDevice:
         device = self.properties
         masses = np.array([device.mass] * 3 + [device.inertia] * 3)
         return 0.5 * float(masses @ self.rate**2)
+
+
+class HeldDevice:
+    """A simulated device in a simulated hand, for `HapticLoop`: each write is a sample time.
+
+    Set `wish` (position, rotation vector; (6,)), `jaw` and `clutch` from any thread.
+    """
+
+    def __init__(self, properties: DeviceProperties, hand: Hand | None = None):
+        self.properties = properties
+        self.simulated = SimulatedDevice(properties, hand)
+        self.wish = np.zeros(6)
+        self.jaw: float | None = None
+        self.clutch = False
+        #: The newest force and torque, and the greatest force so far (N).
+        self.wrench = np.zeros(6)
+        self.peak = 0.0
+        #: Greatest of `SimulatedDevice.active` so far (J).
+        self.active = 0.0
+
+    def read(self) -> DeviceState:
+        """The present state."""
+        position, rotation = self.simulated.read()
+        return DeviceState(position, rotation, self.jaw, self.clutch)
+
+    def write(self, force: Array, torque: Array) -> None:
+        """The motors' force, and a sample time of motion."""
+        self.wrench = np.concatenate([force, torque])
+        self.peak = max(self.peak, float(np.linalg.norm(force)))
+        self.simulated.advance(self.wrench, self.wish)
+        self.active = max(self.active, self.simulated.active)
 
 
 class SimulatedTissue:

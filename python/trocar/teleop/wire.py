@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import threading
+from contextlib import ExitStack
 from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
@@ -94,9 +95,12 @@ class Wire:
     def __init__(self, address: str):
         target = wire_address(address)
         place = urlsplit(target).netloc
+        self._open = ExitStack()
         try:
-            self._socket = websockets.sync.client.connect(
-                target, max_size=None, compression=None, open_timeout=TIMEOUT_S, proxy=None
+            self._socket = self._open.enter_context(
+                websockets.sync.client.connect(
+                    target, max_size=None, compression=None, open_timeout=TIMEOUT_S, proxy=None
+                )
             )
         except (OSError, TimeoutError, WebSocketException) as why:
             raise ConnectionError(f"no connection to trocar view at {place}: {why}") from why
@@ -120,4 +124,4 @@ class Wire:
 
     def close(self) -> None:
         """Ends the connection."""
-        self._socket.close()
+        self._open.close()
