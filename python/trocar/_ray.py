@@ -37,9 +37,7 @@ class Actor:
         folder = phantoms_folder()
         folder.mkdir(parents=True, exist_ok=True)
         python = sys.executable or None
-        self.worker = Worker(
-            self.scene, folder, self.plan, python=python, surfaces=self.surfaces
-        )
+        self.worker = Worker(self.scene, folder, self.plan, python=python, surfaces=self.surfaces)
         self.worker.start(jobs)
 
     def run(self, job: str) -> list[tuple[str, bytes]]:

@@ -95,9 +95,7 @@ def run(
         if jobs and ray_address is None:
             run_on_threads(campaign, scene, jobs, workers, progress, surfaces=surfaces)
         elif jobs and ray_address is not None:
-            run_on_ray(
-                campaign, scene, jobs, workers, ray_address, progress, surfaces=surfaces
-            )
+            run_on_ray(campaign, scene, jobs, workers, ray_address, progress, surfaces=surfaces)
         result: dict[str, Any] = json.loads(campaign.finish())
     except KeyboardInterrupt:
         # Videos take long; the next run makes them.

@@ -43,7 +43,9 @@ def find_episodes(sources: Sequence[str | os.PathLike[str]]) -> list[Path]:
     for source in map(Path, sources):
         inside = sorted(path.parent for path in source.rglob(EPISODE_FILE))
         if not inside:
-            raise ValueError(f"{source}: has no {EPISODE_FILE}; name an episode or a folder of such")
+            raise ValueError(
+                f"{source}: has no {EPISODE_FILE}; name an episode or a folder of such"
+            )
         found += [folder for folder in inside if folder not in found]
     return found
 
@@ -65,16 +67,20 @@ class _Episode:
     @property
     def fps(self) -> int:
         """Frames a second. ValueError unless it is a whole number."""
-        rate = 1.0 / self.header["period_s"]
+        rate: float = 1.0 / self.header["period_s"]
         if abs(rate - round(rate)) > 1e-6:
-            raise ValueError(f"{self.folder}: {rate} control periods a second; a dataset needs whole")
+            raise ValueError(
+                f"{self.folder}: {rate} control periods a second; a dataset needs whole"
+            )
         return round(rate)
 
     def sizes(
         self, cameras: Sequence[str] | None, size: tuple[int, int] | None
     ) -> dict[str, tuple[int, int]]:
         """Height and width of the pictures, by camera (default: all but the recording camera)."""
-        known = {camera["name"]: camera["policy_size_px"][::-1] for camera in self.header["cameras"]}
+        known = {
+            camera["name"]: camera["policy_size_px"][::-1] for camera in self.header["cameras"]
+        }
         if cameras is None:
             cameras = [name for name in known if name != RECORDING_CAMERA]
         for name in cameras:
@@ -97,7 +103,7 @@ class _Episode:
     def normalized(self) -> np.ndarray:
         """The actions with every number in [-1, 1], as environments take with `normalize=True`."""
         low, high = np.array(self.limits["low"]), np.array(self.limits["high"])
-        return np.clip(2.0 * (self.actions - low) / (high - low) - 1.0, -1.0, 1.0)
+        return np.asarray((2.0 * (self.actions - low) / (high - low) - 1.0).clip(-1.0, 1.0))
 
 
 class _LeRobot:
@@ -224,7 +230,9 @@ def export(
             first = kind
             writer = (_LeRobot if layout == "lerobot" else _Robomimic)(output, episode, sizes)
         elif kind != first:
-            raise ValueError(f"{folder}: has another rate, other actions or pictures than the first")
+            raise ValueError(
+                f"{folder}: has another rate, other actions or pictures than the first"
+            )
         writer.write(episode, sizes)
         if note := episode.header["note"]:
             notes.append(f"{folder}: {note}")

@@ -10,6 +10,8 @@ const SPLIT: &str = "split";
 const SPECIMEN: &str = "specimen";
 /// The name of all that varies.
 const ALL: &str = "all";
+/// What the name of the specimen that an organ is of begins with.
+const SWAPPED: &str = "swapped.";
 
 /// Groups: a name for one or more of the others.
 const GROUPS: [(&str, &[&str]); 10] = [
@@ -20,7 +22,7 @@ const GROUPS: [(&str, &[&str]); 10] = [
     ("place", &["specimen_shift_mm", "specimen_turn_deg"]),
     ("start", &["tilt_deg", "azimuth_deg", "insertion_mm", "roll_deg"]),
     ("setup", &["base_shift_mm", "port_shift_mm", "port_tilt_deg"]),
-    ("tool", &["jaw_force_n", "joint_friction_nm", "instrument_mass_scale"]),
+    ("tool", &["jaw_force_n", "joint_friction_nm", "instrument_mass_scale", "control_delay_ms"]),
     ("camera", &["camera_shift_mm", "camera_turn_deg", "focal_scale"]),
     ("light", &["lamp_scale", "exposure_scale", "noise_scale", "gloss_scale", "tint_scale"]),
 ];
@@ -30,6 +32,8 @@ const GROUPS: [(&str, &[&str]); 10] = [
 enum Source {
     Split,
     Specimen,
+    /// The specimen that this organ is of.
+    Swapped(String),
     /// All numbers of a factor as one.
     Factor(Factor),
     /// A single number by its name in tables, such as `left.tilt_deg`.
@@ -72,6 +76,8 @@ impl By {
         }
         if split.of_specimens(&scene.specimens()).len() > 1 {
             all.push(Self::of(SPECIMEN, Source::Specimen, None));
+            let organs = scene.variation.swapped.iter();
+            all.extend(organs.map(|o| Self::of(&format!("{SWAPPED}{o}"), Source::Swapped(o.clone()), None)));
         }
         // A factor of ports varies nothing in a scene without ports.
         let values = scene.draw(0).values;
@@ -106,7 +112,10 @@ impl By {
         }
         let members = GROUPS.iter().find(|(group, _)| *group == name).map(|(_, members)| *members);
         let is_number = || scene.draw(0).values.iter().any(|v| v.name() == name);
-        let known = members.is_some() || [SPLIT, SPECIMEN].contains(&name) || Factor::named(name).is_some();
+        let known = members.is_some()
+            || all.iter().any(|by| by.name == name)
+            || [SPLIT, SPECIMEN].contains(&name)
+            || Factor::named(name).is_some();
         if !known && !is_number() {
             let groups = GROUPS.iter().map(|(group, _)| *group);
             let names =
@@ -125,8 +134,7 @@ impl By {
             return Ok(vec![Self::of(name, Source::Number(number.factor), distributions.get(&number.factor))]);
         }
         let wanted = members.unwrap_or_default();
-        let found: Vec<Self> =
-            all.iter().filter(|by| by.name == name || wanted.contains(&by.name.as_str())).cloned().collect();
+        let found: Vec<Self> = all.iter().filter(|by| by.name == name || by.is_of(wanted)).cloned().collect();
         if found.is_empty() {
             let what = if wanted.len() > 1 { format!("{name} ({})", wanted.join(", ")) } else { name.to_owned() };
             let varied: Vec<&str> = all.iter().map(|by| by.name.as_str()).collect();
@@ -138,12 +146,19 @@ impl By {
         Ok(found)
     }
 
+    /// Whether it is among the `members` of a group. The organs of others go with the specimen.
+    fn is_of(&self, members: &[&str]) -> bool {
+        let name = if matches!(self.source, Source::Swapped(_)) { SPECIMEN } else { self.name.as_str() };
+        members.contains(&name)
+    }
+
     /// The value of an episode; `None` where nothing was drawn for it.
     pub fn value(&self, record: &EpisodeRecord) -> Option<Value> {
         let drawn = record.summary.drawn.as_ref();
         match &self.source {
             Source::Split => Some(Value::Label(Split::of_seed(record.seed).name().to_owned())),
-            Source::Specimen => Some(Value::Label(drawn?.specimen.label())),
+            Source::Specimen => Some(Value::Label(drawn?.specimen.own_label())),
+            Source::Swapped(organ) => drawn?.specimen.swapped.get(organ).cloned().map(Value::Label),
             Source::Number(_) => drawn?.values.iter().find(|v| v.name() == self.name).map(|v| Value::Number(v.value)),
             Source::Factor(factor) => {
                 let values = drawn?.values.iter().filter(|v| v.factor == *factor);
@@ -187,8 +202,15 @@ fn size(factor: Factor, values: &[&DrawnValue]) -> Option<f64> {
 
 /// The words and the unit of a factor's name.
 fn words(name: &str) -> (String, &'static str) {
-    const UNITS: [(&str, &str); 6] =
-        [("_kg_m3", "kg/m3"), ("_mm", "mm"), ("_deg", "degrees"), ("_kpa", "kPa"), ("_nm", "N m"), ("_n", "N")];
+    const UNITS: [(&str, &str); 7] = [
+        ("_kg_m3", "kg/m3"),
+        ("_mm", "mm"),
+        ("_ms", "ms"),
+        ("_deg", "degrees"),
+        ("_kpa", "kPa"),
+        ("_nm", "N m"),
+        ("_n", "N"),
+    ];
     let found = UNITS.iter().find_map(|(end, unit)| Some((name.strip_suffix(end)?, *unit)));
     let (rest, unit) = found.unwrap_or((name, ""));
     (rest.replace('_', " "), unit)
@@ -231,6 +253,13 @@ mod tests {
         );
         assert_eq!(standard(&["tissue", "friction", "left.tilt_deg"]).unwrap(), "modulus_kpa friction left.tilt_deg");
         assert_eq!(standard(&["all"]).unwrap(), standard(&[]).unwrap());
+        let mut swapped = cell_a(VariationSet::Standard);
+        swapped.variation.swapped = vec!["appendix".to_owned()];
+        for by in ["organ", "anatomy"] {
+            let found = By::parse(&[by.to_owned()], &swapped, Split::Seen).unwrap();
+            assert_eq!(found.iter().map(|by| by.name.as_str()).collect::<Vec<_>>(), ["specimen", "swapped.appendix"]);
+        }
+        assert_eq!(By::parse(&["swapped.appendix".to_owned()], &swapped, Split::Seen).unwrap().len(), 1);
         let none = names(&[], VariationSet::None, Split::Both).unwrap();
         assert_eq!(none, "split tilt_deg azimuth_deg insertion_mm roll_deg");
         let said = standard(&["modulous"]).unwrap_err();

@@ -51,8 +51,7 @@ fn why(k: &EpisodeRecord) -> String {
 /// What was drawn for an episode: names with their values.
 fn drawn(k: &EpisodeRecord) -> Vec<(String, String)> {
     let Some(drawn) = &k.summary.drawn else { return Vec::new() };
-    let specimen = ("specimen".to_owned(), drawn.specimen.label());
-    std::iter::once(specimen).chain(drawn.values.iter().map(|v| (v.name(), v.value.to_string()))).collect()
+    drawn.words().into_iter().chain(drawn.values.iter().map(|v| (v.name(), v.value.to_string()))).collect()
 }
 
 /// The table of `records`. Its last columns are the times at which the stages of the task passed

@@ -192,6 +192,69 @@ fn a_haptic_model_predicts_the_force_of_the_next_motion() {
     assert_eq!(cell.haptic_model("left").unwrap().stiffness, [[0.0; 6]; 6], "away from tissue");
 }
 
+/// Places of the tip of an ideal arm (m) at its start and after each of `count` tip actions of 1 mm
+/// along x, with a delay of `ms`; and the state's hash in the end.
+fn moved_late(ms: f64, count: usize) -> (Vec<DVec3>, u64) {
+    let mut scene = ideal(false);
+    scene.rates.control_delay_ms = ms;
+    let mut cell = Cell::new(&scene, &meshed(ONE_END, 4e-3), 1).unwrap();
+    let action = Action { space: ActionSpace::Tip, numbers: vec![1e-3, 0.0, 0.0, 0.0, 1.0] };
+    let mut places = vec![cell.measured_cp("left").unwrap().translation];
+    for _ in 0..count {
+        cell.step(&action).unwrap();
+        places.push(cell.measured_cp("left").unwrap().translation);
+    }
+    (places, cell.hash())
+}
+
+#[test]
+fn late_actions_move_the_arm_as_much_and_later() {
+    let (at_once, _) = moved_late(0.0, 8);
+    // One and two periods, and a period and a half: halfway between two places of a period's end.
+    for (periods, half, ms) in [(1, false, 1000.0 / 30.0), (2, false, 2000.0 / 30.0), (1, true, 50.0)] {
+        let (late, _) = moved_late(ms, 8);
+        assert!(late[..=periods].iter().all(|p| *p == at_once[0]), "{ms} ms: {late:?}");
+        for k in periods + 1..=8 {
+            let whole = at_once[k - periods];
+            let expected = if half { 0.5 * (whole + at_once[k - periods - 1]) } else { whole };
+            assert!(late[k].distance(expected) < 1e-9, "{ms} ms, period {k}: {} is not {expected}", late[k]);
+        }
+    }
+}
+
+#[test]
+fn waiting_actions_are_part_of_the_state_and_bad_ones_never_wait() {
+    let mut scene = scene();
+    scene.rates.control_delay_ms = 110.0;
+    let specimen = meshed(ONE_END, 4e-3);
+    let action = |x: f64| Action { space: ActionSpace::Tip, numbers: [x, 0.0, 0.0, 0.0, 0.5].repeat(2) };
+    let mut one = Cell::new(&scene, &specimen, 1).unwrap();
+    (0..3).for_each(|k| drop(one.step(&action(1e-3 * f64::from(k))).unwrap()));
+    let saved = one.save();
+    let before = one.hash();
+    assert!(one.step(&action(1.0)).unwrap_err().to_string().contains("left tip x"), "refused when it is given");
+    assert_eq!(one.hash(), before);
+    let go = |cell: &mut Cell| -> Vec<u64> {
+        let one = |_| {
+            cell.step(None).unwrap();
+            cell.hash()
+        };
+        (0..6).map(one).collect()
+    };
+    let first = go(&mut one);
+    let mut other = Cell::new(&scene, &specimen, 2).unwrap();
+    other.restore(&saved).unwrap();
+    assert_eq!((other.hash(), go(&mut other)), (before, first));
+    // A restart forgets them.
+    let starts: Vec<Setpoint> = ARMS.map(|arm| other.setpoint(arm).unwrap()).to_vec();
+    let tip = |cell: &mut Cell| {
+        cell.restart(&saved, &starts).unwrap();
+        (0..6).for_each(|_| drop(cell.step(None).unwrap()));
+        cell.setpoint("left").unwrap()
+    };
+    assert_eq!(tip(&mut other), starts[0]);
+}
+
 /// Brings open jaws to the tube and closes them by `jaws`, an opening a period: the force of the
 /// hold and that of the event (N), if anything is held.
 fn close_by(jaws: impl Iterator<Item = f64>) -> Option<(f64, f64)> {

@@ -4,6 +4,7 @@
 use crate::Phantom;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use trocar_specimen::{End, Material, MaterialModel, Pins};
 
 /// Name of the ground under the organs in a filtered pair. No organ may have it.
@@ -23,6 +24,10 @@ pub struct SpecimenSource {
     /// Seed of the phantom's anatomy.
     #[serde(default = "first_seed")]
     pub seed: u32,
+    /// Organs of other specimens in the place of its own: by the organ's name, a specimen folder or
+    /// a phantom with its seed, as phantom-a:7.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub swapped: BTreeMap<String, String>,
 }
 
 fn first_seed() -> u32 {
@@ -41,17 +46,26 @@ pub enum Source<'a> {
 impl SpecimenSource {
     /// A phantom.
     pub fn phantom(name: &str, seed: u32) -> Self {
-        Self { path: None, phantom: Some(name.to_owned()), seed }
+        Self { path: None, phantom: Some(name.to_owned()), seed, swapped: BTreeMap::new() }
     }
 
     /// A specimen folder.
     pub fn folder(path: &str) -> Self {
-        Self { path: Some(path.to_owned()), phantom: None, seed: first_seed() }
+        Self { path: Some(path.to_owned()), phantom: None, seed: first_seed(), swapped: BTreeMap::new() }
     }
 
     /// What it is called in results: a folder's path, or a phantom with its seed, as
-    /// `phantom-a:1`.
+    /// `phantom-a:1`; then the organs of others, as `phantom-a:1 with appendix of phantom-a:7`.
     pub fn label(&self) -> String {
+        let organs: Vec<String> = self.organs_of_others().map(|(organ, other)| format!("{organ} of {other}")).collect();
+        match organs.as_slice() {
+            [] => self.own_label(),
+            _ => format!("{} with {}", self.own_label(), organs.join(" and ")),
+        }
+    }
+
+    /// The same without organs of others.
+    pub fn own_label(&self) -> String {
         match self.source() {
             Some(Source::Folder(path)) => path.to_owned(),
             Some(Source::Phantom(name, seed)) => format!("{name}:{seed}"),
@@ -59,7 +73,20 @@ impl SpecimenSource {
         }
     }
 
-    /// What [`label`](Self::label) calls so.
+    /// The specimen without organs of others.
+    #[must_use]
+    pub fn own(&self) -> Self {
+        Self { swapped: BTreeMap::new(), ..self.clone() }
+    }
+
+    /// Organs with the labels of the specimens that they are of. One of the specimen itself is its
+    /// own.
+    pub fn organs_of_others(&self) -> impl Iterator<Item = (&str, &str)> {
+        let own = self.own_label();
+        self.swapped.iter().map(|(organ, other)| (organ.as_str(), other.as_str())).filter(move |(_, o)| *o != own)
+    }
+
+    /// What [`own_label`](Self::own_label) calls so.
     pub fn labelled(label: &str) -> Self {
         let parts = label.rsplit_once(':').and_then(|(name, seed)| Some((Phantom::named(name)?, seed.parse().ok()?)));
         parts.map_or_else(|| Self::folder(label), |(phantom, seed)| Self::phantom(phantom.name, seed))

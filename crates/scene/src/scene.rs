@@ -79,18 +79,27 @@ pub struct Tool<'a> {
 }
 
 /// How often things happen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Rates {
     /// Actions and observations a second (Hz).
     pub control_hz: u32,
     /// Steps of the arms a second (Hz); a multiple of `control_hz`.
     pub physics_hz: u32,
+    /// Time from an action to the arms (ms), to the nearest physics step.
+    #[serde(skip_serializing_if = "no_delay")]
+    pub control_delay_ms: f64,
+}
+
+/// A scene without a delay is written as before there were delays.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn no_delay(ms: &f64) -> bool {
+    *ms == 0.0
 }
 
 impl Default for Rates {
     fn default() -> Self {
-        Self { control_hz: 30, physics_hz: 480 }
+        Self { control_hz: 30, physics_hz: 480, control_delay_ms: 0.0 }
     }
 }
 
@@ -206,8 +215,10 @@ impl Scene {
         let mut scene = self.clone();
         scene.description.clear();
         if let Some(Source::Folder(_)) = self.specimen.source() {
-            scene.specimen = SpecimenSource { path: Some(String::new()), phantom: None, seed: 0 };
+            scene.specimen = SpecimenSource { seed: 0, ..SpecimenSource::folder("") };
         }
+        // Organs of others are in the specimen's contents.
+        scene.specimen.swapped.clear();
         let mut hash = Xxh3::new();
         hash.update(scene.to_toml()?.as_bytes());
         for content in contents {

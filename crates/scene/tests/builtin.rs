@@ -84,7 +84,7 @@ fn the_hash_knows_what_counts() {
     other.ports[0].hole_diameter_mm += 1e-9;
     assert_ne!(other.hash(&[1]).unwrap(), hash);
     let at = |path: &str| {
-        let specimen = SpecimenSource { path: Some(path.into()), phantom: None, seed: 1 };
+        let specimen = SpecimenSource::folder(path);
         Scene { specimen, ..scene.clone() }.hash(&[1]).unwrap()
     };
     assert_eq!(at("a"), at("b/c"));

@@ -107,6 +107,64 @@ fn specimens_are_drawn_evenly() {
 }
 
 #[test]
+fn organs_are_drawn_from_another_of_the_specimens() {
+    let mut scene = cell_a(VariationSet::Standard);
+    let plain = scene.clone();
+    scene.variation.swapped = vec!["appendix".to_owned()];
+    scene.validate().unwrap();
+    let mut others = BTreeSet::new();
+    for seed in (0..60).chain(Split::FIRST_UNSEEN..Split::FIRST_UNSEEN + 20) {
+        let (drawn, own) = (scene.draw(seed), plain.draw(seed));
+        assert_eq!((drawn.specimen.own(), &drawn.values), (own.specimen, &own.values), "nothing else changes");
+        let other = drawn.specimen.swapped["appendix"].clone();
+        assert_ne!(other, drawn.specimen.own_label());
+        let part = Split::of_seed(seed).of_specimens(&scene.specimens()).to_vec();
+        assert!(part.contains(&SpecimenSource::labelled(&other)), "{seed}: {other} is of the other split");
+        let toml: Drawn = trocar_specimen::parse_toml(&drawn.to_toml().unwrap()).unwrap();
+        let json: Drawn = serde_json::from_str(&serde_json::to_string(&drawn).unwrap()).unwrap();
+        assert_eq!((&toml, &json), (&drawn, &drawn));
+        assert_eq!(drawn.words()[1], ("swapped.appendix".to_owned(), other.clone()));
+        assert_eq!(scene.with_drawn(&drawn, &nothing()).specimen, drawn.specimen);
+        others.insert(other);
+    }
+    assert_eq!(others.len(), 8, "each as likely: {others:?}");
+    // One specimen has no other.
+    scene.variation.set = VariationSet::None;
+    assert!(scene.draw(0).specimen.swapped.is_empty());
+}
+
+#[test]
+fn a_scene_may_name_an_organ_of_another_specimen() {
+    let text = "name = 'a'\n[specimen]\nphantom = 'phantom-a'\nseed = 3\nswapped = { appendix = 'phantom-a:7' }\n";
+    let parse = |text: &str| Scene::parse(text, "a", "".as_ref()).map_err(|e| e.to_string());
+    let scene = parse(text).unwrap();
+    assert_eq!(scene.specimen.label(), "phantom-a:3 with appendix of phantom-a:7");
+    assert_eq!(parse(&scene.to_toml().unwrap()).unwrap(), scene);
+    let drawn = scene.draw(0);
+    assert_eq!(trocar_specimen::parse_toml::<Drawn>(&drawn.to_toml().unwrap()).unwrap(), drawn);
+    // Every anatomy has it, and the one that it is of has its own.
+    let mut varied = scene.clone();
+    varied.variation.set = VariationSet::Standard;
+    let all = varied.specimens();
+    assert!(all.len() == 8 && all.iter().all(|s| s.swapped == scene.specimen.swapped));
+    assert_eq!((all[6].label(), all[6].organs_of_others().count()), ("phantom-a:7".to_owned(), 0));
+    for (from, to, said) in [
+        ("appendix =", "liver =", "specimen.swapped.liver names 'liver'; the specimen's organs are: cecum"),
+        ("'phantom-a:7'", "'phantom-z:7'", "specimen.swapped.appendix is 'phantom-z:7'; it must be a specimen folder"),
+    ] {
+        let why = parse(&text.replace(from, to)).unwrap_err();
+        assert!(why.contains(said), "{why}");
+    }
+    for (organs, said) in [
+        ("['liver']", "variation.swapped[0] is 'liver'; the specimen's organs are: cecum"),
+        ("['appendix', 'appendix']", "variation.swapped[1] is 'appendix' again"),
+    ] {
+        let why = parse(&format!("{text}[variation]\nswapped = {organs}\n")).unwrap_err();
+        assert!(why.contains(said), "{why}");
+    }
+}
+
+#[test]
 fn the_default_set_is_for_scenes_without_one() {
     let standard = |scene: &Scene, given| scene.variation.chosen(given, VariationSet::Standard).set;
     assert_eq!(standard(&cell_a(VariationSet::None), None), VariationSet::Standard);

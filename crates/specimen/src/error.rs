@@ -24,6 +24,14 @@ pub enum Error {
         /// The field, what is wrong with it, and what would be right.
         reason: String,
     },
+    /// An organ of one specimen cannot be in another.
+    #[error("organ '{organ}' {reason}")]
+    Swap {
+        /// The organ.
+        organ: String,
+        /// What is wrong, and what would be right.
+        reason: String,
+    },
     /// A mesh of the specimen is unusable.
     #[error(transparent)]
     Geometry(#[from] trocar_geometry::Error),

@@ -15,6 +15,7 @@ mod organ;
 mod specimen;
 mod staged;
 mod strict_toml;
+mod swap;
 
 pub use error::{Error, Result};
 pub use organ::{End, Material, MaterialModel, Organ, OrganFacts, Pins, check_name};

@@ -82,6 +82,30 @@ fn starts_do_not_depend_on_what_else_is_drawn() {
 }
 
 #[test]
+fn a_drawn_delay_is_in_the_cell_and_in_the_episode_file() {
+    let mut scene = scene(VariationSet::None);
+    scene.variation.factors.insert(Factor::ControlDelay, Distribution::Uniform([40.0, 120.0]));
+    let specimen = two_tubes(ONE_END, 4e-3);
+    let mut episode = Episode::new(&scene, &specimen, 1).unwrap();
+    let mut run =
+        |seed: u64| run(&mut episode, policy::named("random").unwrap().as_mut(), seed, &mut |_| true).unwrap();
+    let (one, other) = (run(1), run(2));
+    let delay = |drawn: &trocar_scene::Drawn| {
+        drawn.values.iter().find(|v| v.factor == Factor::ControlDelay).map(|v| v.value).unwrap()
+    };
+    let [first, second] = [&one, &other].map(|r| delay(r.summary.drawn.as_ref().unwrap()));
+    assert!(first != second && (40.0..=120.0).contains(&first), "{first} {second}");
+    assert_eq!(run(1).file, one.file, "the same bits again");
+    let written: Scene = trocar_specimen::parse_toml(&one.file.header.scene).unwrap();
+    assert!(one.file.verify(&written, &specimen, 2, &mut || true).unwrap().same);
+    // With another delay the same actions give another episode.
+    let mut file = one.file;
+    file.header.drawn = file.header.drawn.replace(&first.to_string(), &second.to_string());
+    let verdict = file.verify(&written, &specimen, 1, &mut || true).unwrap();
+    assert!(!verdict.same && verdict.first_difference.is_some_and(|k| k > 0), "{verdict:?}");
+}
+
+#[test]
 fn a_replay_draws_nothing() {
     let scene = scene(VariationSet::Standard);
     let mut episode = Episode::with_specimens(&scene, Box::new(Tubes), 1).unwrap();

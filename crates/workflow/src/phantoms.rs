@@ -77,32 +77,40 @@ fn kept_in(phantoms: &Path, name: &str, seed: u32) -> PathBuf {
     phantoms.join(format!("{name}-{seed}"))
 }
 
-/// Whether the specimen that `source` names is there: a folder, or a phantom that some program has
-/// made in the folder `phantoms`.
+/// Whether the specimen that `source` names is there, and those that organs of it are of: a folder,
+/// or a phantom that some program has made in the folder `phantoms`.
 pub fn is_made(source: &SpecimenSource, phantoms: &Path) -> bool {
-    match source.source() {
+    let own = match source.source() {
         Some(Source::Phantom(name, seed)) => kept_in(phantoms, name, seed).join(STAMP).is_file(),
         Some(Source::Folder(_)) | None => true,
-    }
+    };
+    own && source.organs_of_others().all(|(_, other)| is_made(&SpecimenSource::labelled(other), phantoms))
 }
 
 /// The specimen that `source` names: from its folder, whose path starts from `folder`, or of its
-/// phantom, which is made once in the folder `phantoms` and kept.
+/// phantom, which is made once in the folder `phantoms` and kept. Organs of other specimens are in
+/// the place of its own.
 ///
 /// # Errors
-/// As [`scene_specimen`].
+/// As [`scene_specimen`]; an organ of another specimen that does not fit.
 pub fn source_specimen(
     source: &SpecimenSource,
     folder: &Path,
     phantoms: &Path,
     progress: &dyn Progress,
 ) -> Result<Specimen> {
-    match source.source() {
-        Some(Source::Folder(path)) => Ok(Specimen::read(&folder.join(path))?),
+    let mut made = match source.source() {
+        Some(Source::Folder(path)) => Specimen::read(&folder.join(path))?,
         Some(Source::Phantom(name, seed)) => {
             let options = RecordOptions { frames: FRAMES, seed: u64::from(seed), ..RecordOptions::default() };
-            specimen(name, &options, &kept_in(phantoms, name, seed), progress)
+            specimen(name, &options, &kept_in(phantoms, name, seed), progress)?
         }
-        None => Err(Error::Mismatch("the scene names neither a specimen folder nor a phantom".to_owned())),
+        None => return Err(Error::Mismatch("the scene names neither a specimen folder nor a phantom".to_owned())),
+    };
+    for (organ, other) in source.organs_of_others() {
+        let given = source_specimen(&SpecimenSource::labelled(other), folder, phantoms, progress)?;
+        let why = |e: trocar_specimen::Error| Error::Mismatch(format!("{}: {e}", source.label()));
+        made = made.with_organ_of(&given, organ).map_err(why)?;
     }
+    Ok(made)
 }

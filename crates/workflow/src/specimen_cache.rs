@@ -105,7 +105,7 @@ pub fn drawn_specimens(scene: &Scene, seeds: impl Iterator<Item = u64>) -> Vec<S
         if !drawn.contains(&source) {
             drawn.push(source);
         }
-        if drawn.len() == all {
+        if drawn.len() == all && scene.variation.swapped.is_empty() {
             break;
         }
     }

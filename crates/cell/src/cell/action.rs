@@ -43,13 +43,17 @@ impl Action {
         Self { space: ActionSpace::Pivots, numbers: targets.iter().flat_map(|t| t.0).collect() }
     }
 
-    /// The command in the five numbers from `first` on.
-    pub(super) fn wanted(&self, model: &ArmModel, state: &ArmState, first: usize) -> Result<Wanted> {
-        let n = &self.numbers[first..first + NUMBERS];
-        self.check(model, n).map_err(|(k, reason)| {
+    /// Checks the five numbers from `first` on, for any state of the arm.
+    pub(super) fn check(&self, model: &ArmModel, first: usize) -> Result<()> {
+        self.mistake(model, &self.numbers[first..first + NUMBERS]).map_err(|(k, reason)| {
             let number = self.space.names(&model.workspace)[k];
             Error::Action { index: first + k, name: format!("{} {number}", model.side.name()), reason }
-        })?;
+        })
+    }
+
+    /// The command in the five checked numbers from `first` on.
+    pub(super) fn wanted(&self, model: &ArmModel, state: &ArmState, first: usize) -> Result<Wanted> {
+        let n = &self.numbers[first..first + NUMBERS];
         let space = &model.workspace;
         match self.space {
             ActionSpace::Pivots => {
@@ -69,7 +73,7 @@ impl Action {
     }
 
     /// Finds a number that is wrong in any state of the arm: its index, and what would be right.
-    fn check(&self, model: &ArmModel, n: &[f64]) -> std::result::Result<(), (usize, String)> {
+    fn mistake(&self, model: &ArmModel, n: &[f64]) -> std::result::Result<(), (usize, String)> {
         if let Some(k) = n.iter().position(|a| !a.is_finite()) {
             return Err((k, format!("is {}; it must be finite", n[k])));
         }

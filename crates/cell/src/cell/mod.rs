@@ -9,6 +9,7 @@ mod arm;
 mod build;
 mod clearance;
 mod crtk;
+mod delay;
 mod drive;
 mod exchange;
 mod figures;
@@ -46,6 +47,7 @@ pub use workspace::{FreeSpace, PortSpace, Reached, Workspace};
 
 use crate::{Error, Result, World};
 use arm::ArmUnit;
+use delay::{Delay, Waiting};
 use rules::Edges;
 use std::time::Duration;
 use trocar_scene::{SafetyRules, Scene};
@@ -93,6 +95,9 @@ pub struct Cell {
     /// Tissue frames of a control period, and physics steps of the arms in a frame.
     frames: u32,
     physics_steps: u32,
+    /// The control delay, and the actions that wait.
+    delay: Delay,
+    waiting: Waiting,
     /// Whether cuts sever tissue.
     sever: bool,
     /// The safety rules that are applied.
@@ -144,6 +149,8 @@ impl Cell {
             control_hz: scene.rates.control_hz,
             frames,
             physics_steps,
+            delay: Delay::new(1e-3 * scene.rates.control_delay_ms, scene.rates.physics_hz, frames * physics_steps),
+            waiting: Waiting::default(),
             sever: scene.task.sever,
             rules: scene.safety.rules,
             timing: Timing::default(),

@@ -37,6 +37,7 @@ impl Cell {
             let (pose, design) = (arm.drive.tip(), arm.state.design);
             arm.state = ArmState::new(pose, &arm.model, *start, design, jaw, scissors);
         }
+        self.waiting.0.clear();
         self.periods = 0;
         Ok(())
     }

@@ -5,6 +5,7 @@ mod tests;
 
 use super::Cell;
 use super::arm::ArmState;
+use super::delay::Waiting;
 use super::drive::DriveState;
 use super::rules::Edges;
 use crate::Result;
@@ -19,13 +20,14 @@ pub struct CellState {
     arms: Vec<(ArmState, DriveState)>,
     waits: Vec<u32>,
     touch: bool,
+    waiting: Waiting,
     periods: u64,
 }
 
 impl CellState {
     /// Hash over every bit on which later steps depend.
     pub fn hash(&self) -> u64 {
-        let Self { world, arms, waits, touch, periods } = self;
+        let Self { world, arms, waits, touch, waiting, periods } = self;
         let mut hash = Xxh3::new();
         hash.update(&periods.to_le_bytes());
         hash.update(&world.hash().to_le_bytes());
@@ -36,6 +38,8 @@ impl CellState {
                 hash.update(&number.to_bits().to_le_bytes());
             }
         }
+        // Nothing where nothing waits: hashes of cells without a delay are those of earlier versions.
+        waiting.numbers().for_each(|number| hash.update(&number.to_bits().to_le_bytes()));
         hash.digest()
     }
 }
@@ -50,9 +54,11 @@ impl Cell {
             periods,
             waits,
             touch,
+            waiting,
             control_hz: _,
             frames: _,
             physics_steps: _,
+            delay: _,
             sever: _,
             motions: _,
             edges: _,
@@ -64,6 +70,7 @@ impl Cell {
             arms: arms.iter().map(|arm| (arm.state.clone(), arm.drive.state())).collect(),
             waits: waits.clone(),
             touch: *touch,
+            waiting: waiting.clone(),
             periods: *periods,
         }
     }
@@ -74,7 +81,7 @@ impl Cell {
     /// # Errors
     /// A state of a cell with other arms or organs.
     pub fn restore(&mut self, state: &CellState) -> Result<()> {
-        let CellState { world, arms, waits, touch, periods } = state;
+        let CellState { world, arms, waits, touch, waiting, periods } = state;
         if arms.len() != self.arms.len() {
             let (given, here) = (arms.len(), self.arms.len());
             return Err(crate::Error::Option(format!("the state has {given} arms, the cell {here}")));
@@ -91,6 +98,7 @@ impl Cell {
         }
         self.waits.clone_from(waits);
         self.touch = *touch;
+        self.waiting.clone_from(waiting);
         self.periods = *periods;
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! Checks of the specimen, the settings of its organs, and their tissue.
 
 use super::{Checked, Problem, join, name, number, numbers, one_of, point, problem, quaternion};
-use crate::{FIELD, MaterialOverride, PHANTOMS, PinEnd, PinRule, Scene, Source};
+use crate::{FIELD, MaterialOverride, PHANTOMS, PinEnd, PinRule, Scene, Source, SpecimenSource};
 use trocar_specimen::{End, Material};
 
 pub(super) fn check(scene: &Scene) -> Checked {
@@ -40,6 +40,18 @@ fn specimen(scene: &Scene) -> Checked {
             return Err(problem("specimen", " has neither a path nor a phantom; it must have one of them".into()));
         }
         _ => {}
+    }
+    for (organ, other) in &given.swapped {
+        let at = format!("specimen.swapped.{organ}");
+        match SpecimenSource::labelled(other).source() {
+            Some(Source::Folder(path)) if !scene.resolve(path).join("specimen.toml").is_file() => {
+                let shown: String = other.chars().take(200).flat_map(char::escape_default).collect();
+                let reason =
+                    format!(" is '{shown}'; it must be a specimen folder, or a phantom with its seed, as phantom-a:7");
+                return Err(problem(at, reason));
+            }
+            _ => {}
+        }
     }
     match given.source() {
         Some(Source::Phantom(name, _)) => {
@@ -95,6 +107,13 @@ pub(crate) fn check_organs(scene: &Scene, organs: &[String]) -> Checked {
     for organ in scene.organs.keys() {
         one_of(&format!("organ.{organ}"), organ, "the specimen's organs are", &known)
             .map_err(|p| problem(p.field, p.reason.replacen(" is ", " names ", 1)))?;
+    }
+    for organ in scene.specimen.swapped.keys() {
+        one_of(&format!("specimen.swapped.{organ}"), organ, "the specimen's organs are", &known)
+            .map_err(|p| problem(p.field, p.reason.replacen(" is ", " names ", 1)))?;
+    }
+    for (k, organ) in scene.variation.swapped.iter().enumerate() {
+        one_of(&format!("variation.swapped[{k}]"), organ, "the specimen's organs are", &known)?;
     }
     let mut touching = known.clone();
     touching.push(FIELD);

@@ -63,7 +63,14 @@ pub(super) fn check(scene: &Scene) -> Checked {
 fn rates(scene: &Scene) -> Checked {
     let rates = scene.rates;
     let (control, physics) = (f64::from(rates.control_hz), f64::from(rates.physics_hz));
-    numbers("rates", &[("control_hz", control, 1.0..=1000.0), ("physics_hz", physics, 1.0..=100_000.0)])?;
+    numbers(
+        "rates",
+        &[
+            ("control_hz", control, 1.0..=1000.0),
+            ("physics_hz", physics, 1.0..=100_000.0),
+            ("control_delay_ms", rates.control_delay_ms, Factor::ControlDelay.range()),
+        ],
+    )?;
     if rates.physics_hz.is_multiple_of(rates.control_hz) {
         return Ok(());
     }

@@ -12,6 +12,13 @@ pub(super) fn check(scene: &Scene) -> Checked {
     if let Some(specimens) = &scene.variation.specimens {
         self::specimens(scene, specimens)?;
     }
+    let mut seen: Vec<&str> = Vec::new();
+    for (k, organ) in scene.variation.swapped.iter().enumerate() {
+        if seen.contains(&organ.as_str()) {
+            return Err(problem(format!("variation.swapped[{k}]"), format!(" is '{organ}' again; name it once")));
+        }
+        seen.push(organ);
+    }
     for (factor, distribution) in &scene.variation.factors {
         let field = format!("variation.{}", factor.name());
         if let Some(mistake) = distribution.mistake() {

@@ -74,6 +74,8 @@ impl Scene {
     }
 
     fn vary_tools(&mut self, drawn: &Drawn) {
+        let delay = &mut self.rates.control_delay_ms;
+        *delay = drawn.one(Factor::ControlDelay).unwrap_or(*delay);
         for instrument in &mut self.instruments {
             if instrument.kind == InstrumentKind::Grasper {
                 instrument.jaw_force_n = drawn.one(Factor::JawForce).unwrap_or(instrument.jaw_force_n);

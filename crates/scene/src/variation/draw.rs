@@ -5,7 +5,21 @@ use crate::{EpisodeRandom, Error, Lens, Result, Scene, SpecimenSource, Tool};
 use serde::de::{Error as _, MapAccess, Visitor};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::collections::BTreeMap;
 use std::fmt;
+
+/// The name of an organ's other specimen in tables begins so.
+const SWAPPED: &str = "swapped.";
+
+/// The name in tables of the specimen that an organ is of.
+fn swapped_name(organ: &str) -> String {
+    format!("{SWAPPED}{organ}")
+}
+
+/// The organ whose other specimen has that name in tables.
+fn swapped_organ(name: &str) -> Option<&str> {
+    name.strip_prefix(SWAPPED).filter(|_| DrawnValue::named(name, 0.0).is_none())
+}
 
 /// One drawn number.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,6 +78,14 @@ impl Drawn {
         Self { specimen, values }
     }
 
+    /// The words beside the numbers, by their names in tables: the specimen, and those that single
+    /// organs are of (`swapped.ORGAN`).
+    pub fn words(&self) -> Vec<(String, String)> {
+        let specimen = (super::SPECIMEN.to_owned(), self.specimen.own_label());
+        let swapped = self.specimen.swapped.iter().map(|(organ, other)| (swapped_name(organ), other.clone()));
+        std::iter::once(specimen).chain(swapped).collect()
+    }
+
     /// As TOML, for files that it is read back from to the bit.
     ///
     /// # Errors
@@ -91,7 +113,9 @@ impl Drawn {
 impl Serialize for Drawn {
     fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(1 + self.values.len()))?;
-        map.serialize_entry(super::SPECIMEN, &self.specimen.label())?;
+        for (name, word) in self.words() {
+            map.serialize_entry(&name, &word)?;
+        }
         for value in &self.values {
             map.serialize_entry(&value.name(), &value.value)?;
         }
@@ -110,17 +134,21 @@ impl<'de> Deserialize<'de> for Drawn {
             }
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> std::result::Result<Drawn, A::Error> {
-                let (mut specimen, mut values) = (None, Vec::new());
+                let (mut specimen, mut swapped, mut values) = (None, BTreeMap::new(), Vec::new());
                 while let Some(name) = map.next_key::<String>()? {
                     if name == super::SPECIMEN {
                         specimen = Some(SpecimenSource::labelled(&map.next_value::<String>()?));
+                        continue;
+                    }
+                    if let Some(organ) = swapped_organ(&name) {
+                        swapped.insert(organ.to_owned(), map.next_value()?);
                         continue;
                     }
                     let value = DrawnValue::named(&name, map.next_value()?);
                     values.push(value.ok_or_else(|| A::Error::custom(format!("'{name}' is no drawn number")))?);
                 }
                 let specimen = specimen.ok_or_else(|| A::Error::missing_field(super::SPECIMEN))?;
-                Ok(Drawn::new(specimen, values))
+                Ok(Drawn::new(SpecimenSource { swapped, ..specimen }, values))
             }
         }
         deserializer.deserialize_map(Numbers)
@@ -181,12 +209,22 @@ impl Scene {
     fn draw_specimen(&self, seed: u64) -> SpecimenSource {
         let all = self.specimens();
         let all = Split::of_seed(seed).of_specimens(&all);
-        let at = EpisodeRandom::new(seed, "variation/specimen").unit(0) * all.len() as f64;
-        all.get(at as usize).unwrap_or(&self.specimen).clone()
+        let one = |purpose: &str, all: &[&SpecimenSource]| {
+            let at = EpisodeRandom::new(seed, purpose).unit(0) * all.len() as f64;
+            all.get(at as usize).map(|source| (*source).clone())
+        };
+        let mut drawn = one("variation/specimen", &all.iter().collect::<Vec<_>>()).unwrap_or(self.specimen.clone());
+        let others: Vec<&SpecimenSource> = all.iter().filter(|s| s.own() != drawn.own()).collect();
+        for organ in &self.variation.swapped {
+            if let Some(other) = one(&format!("variation/swapped/{organ}"), &others) {
+                drawn.swapped.insert(organ.clone(), other.own_label());
+            }
+        }
+        drawn
     }
 
-    /// The specimens that episodes have, in a fixed order; the last quarter of them is for unseen
-    /// ones ([`Split`]).
+    /// The specimens that episodes have, but for organs that are drawn from another of them, in a
+    /// fixed order; the last quarter of them is for unseen ones ([`Split`]).
     pub fn specimens(&self) -> Vec<SpecimenSource> {
         let drawn = match (&self.variation.specimens, self.variation.set, &self.specimen.phantom) {
             (Some(drawn), _, _) => drawn.clone(),
@@ -198,7 +236,8 @@ impl Scene {
         let [first, last] = drawn.seeds;
         let phantoms = drawn.phantoms.iter().flat_map(|name| (first..=last).map(|s| SpecimenSource::phantom(name, s)));
         let paths = drawn.paths.iter().map(|path| SpecimenSource::folder(path));
-        phantoms.chain(paths).collect()
+        let swapped = &self.specimen.swapped;
+        phantoms.chain(paths).map(|source| SpecimenSource { swapped: swapped.clone(), ..source }).collect()
     }
 }
 

@@ -69,6 +69,7 @@ factors! {
     JawForce "jaw_force_n" Cell [""] 0.01..=40.0, "Force with which graspers close (N).";
     JointFriction "joint_friction_nm" Cell [""] 0.0..=5.0, "Joint friction that the controllers know nothing of (N m).";
     InstrumentMass "instrument_mass_scale" Cell [""] 0.5..=2.0, "Factor on the mass of all instruments.";
+    ControlDelay "control_delay_ms" Cell [""] 0.0..=2000.0, "Time from an action to the arms (ms).";
     Tilt "tilt_deg" Arm [""] -30.0..=30.0, "Added to the tilt of the instrument at the start (degrees).";
     Azimuth "azimuth_deg" Arm [""] -180.0..=180.0, "Added to the azimuth of the instrument at the start (degrees).";
     Insertion "insertion_mm" Arm [""] -100.0..=100.0, "Added to the insertion at the start (mm); of an arm without a port, to each coordinate of its position.";
@@ -90,5 +91,12 @@ impl Factor {
     /// The factor of that name in scene files.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|f| f.name() == name)
+    }
+
+    /// Whether it changes pictures and nothing else.
+    pub fn is_of_pictures(self) -> bool {
+        use Factor::{CameraShift, CameraTurn, ExposureScale, FocalScale, GlossScale, LampScale, NoiseScale, Tint};
+        let of_cameras = matches!(self, CameraShift | CameraTurn | FocalScale);
+        of_cameras || matches!(self, LampScale | ExposureScale | NoiseScale | GlossScale | Tint)
     }
 }

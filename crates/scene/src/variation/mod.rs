@@ -88,6 +88,8 @@ pub struct Variation {
     pub set: VariationSet,
     /// The specimens that are drawn from; those of the set if `None`.
     pub specimens: Option<Specimens>,
+    /// Organs that come from another of the specimens.
+    pub swapped: Vec<String>,
     /// Distributions of single factors.
     pub factors: BTreeMap<Factor, Distribution>,
 }
@@ -95,6 +97,7 @@ pub struct Variation {
 const SET: &str = "set";
 const SPECIMEN: &str = "specimen";
 const SPECIMENS: &str = "specimens";
+const SWAPPED: &str = "swapped";
 
 impl Variation {
     /// The distributions of all factors that are drawn: those of the set, and the scene's own
@@ -129,6 +132,7 @@ impl Variation {
     /// Whether episodes depend on their seed.
     pub fn varies(&self) -> bool {
         self.specimens.is_some()
+            || !self.swapped.is_empty()
             || self.set >= VariationSet::Standard
             || self.all_factors().values().any(Distribution::varies)
     }
@@ -138,6 +142,9 @@ impl Serialize for Variation {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
         map.serialize_entry(SET, &self.set)?;
+        if !self.swapped.is_empty() {
+            map.serialize_entry(SWAPPED, &self.swapped)?;
+        }
         for (factor, distribution) in &self.factors {
             map.serialize_entry(factor.name(), distribution)?;
         }
@@ -155,7 +162,7 @@ impl<'de> Deserialize<'de> for Variation {
             type Value = Variation;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a table of `set`, `specimens` and factors")
+                f.write_str("a table of `set`, `specimens`, `swapped` and factors")
             }
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Variation, A::Error> {
@@ -164,6 +171,7 @@ impl<'de> Deserialize<'de> for Variation {
                     match (key.as_ref(), Factor::named(&key)) {
                         (SET, _) => variation.set = map.next_value()?,
                         (SPECIMENS, _) => variation.specimens = Some(map.next_value()?),
+                        (SWAPPED, _) => variation.swapped = map.next_value()?,
                         (_, Some(factor)) => _ = variation.factors.insert(factor, map.next_value()?),
                         (unknown, None) => return Err(A::Error::unknown_field(unknown, known())),
                     }
@@ -178,7 +186,7 @@ impl<'de> Deserialize<'de> for Variation {
 /// The keys of the table.
 fn known() -> &'static [&'static str] {
     static KEYS: std::sync::OnceLock<Vec<&'static str>> = std::sync::OnceLock::new();
-    KEYS.get_or_init(|| [SET, SPECIMENS].into_iter().chain(Factor::NAMES.iter().copied()).collect())
+    KEYS.get_or_init(|| [SET, SPECIMENS, SWAPPED].into_iter().chain(Factor::NAMES.iter().copied()).collect())
 }
 
 impl JsonSchema for Variation {
@@ -195,6 +203,9 @@ impl JsonSchema for Variation {
         let specimens = generator.subschema_for::<Specimens>();
         let said = "The specimens that an episode's one is drawn from.";
         properties.insert(SPECIMENS.to_owned(), serde_json::json!({ "description": said, "allOf": [specimens] }));
+        let said = "Organs that come from another of the specimens than the rest, each as likely.";
+        let organs = generator.subschema_for::<Vec<String>>();
+        properties.insert(SWAPPED.to_owned(), serde_json::json!({ "description": said, "allOf": [organs] }));
         for factor in Factor::ALL {
             let one = serde_json::json!({ "description": factor.about(), "allOf": [distribution] });
             properties.insert(factor.name().to_owned(), one);

@@ -36,6 +36,7 @@ pub(super) fn factors(set: VariationSet) -> BTreeMap<Factor, Distribution> {
                 (Factor::JawForce, Uniform([0.35, 0.8])),
                 (Factor::JointFriction, Uniform([0.0, 0.6])),
                 (Factor::InstrumentMass, Uniform([0.8, 1.2])),
+                (Factor::ControlDelay, Uniform([0.0, 200.0])),
                 (Factor::BaseShift, Within(10.0)),
                 (Factor::PortShift, Within(4.0)),
                 (Factor::PortTilt, Within(5.0)),

@@ -114,7 +114,7 @@ impl Whole {
             Condition::Cell => Scene::builtin(CELL)?,
         };
         let folder = std::path::absolute(&self.folder).unwrap_or_else(|_| self.folder.clone());
-        scene.specimen = SpecimenSource { path: Some(folder.display().to_string()), phantom: None, seed: 1 };
+        scene.specimen = SpecimenSource::folder(&folder.display().to_string());
         scene.task = grasp_lift(ORGAN);
         scene.variation = Variation::default();
         Ok(scene)

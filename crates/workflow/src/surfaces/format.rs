@@ -265,7 +265,7 @@ impl Decoder {
         let header = line.header;
         let links = header.arms.iter().map(|a| a.links).max().unwrap_or(0);
         let counts = [header.organs.len(), header.arms.len(), links, header.state_names.len()];
-        if counts.iter().any(|n| *n > MOST_NAMES) || !(header.period_s > 0.0) {
+        if counts.iter().any(|n| *n > MOST_NAMES) || header.period_s.is_nan() || header.period_s <= 0.0 {
             return Err("its header is damaged: it has too many names, or no control period".to_owned());
         }
         let mut body = std::io::Cursor::new(bytes);

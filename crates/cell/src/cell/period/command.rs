@@ -1,5 +1,6 @@
-//! Stage 1: the action is checked whole, and each arm gets a setpoint for the period: within its
-//! speed limits, above the floor, and no further against a force than the force guard allows.
+//! Stage 1: the action is checked whole. After the control delay each arm gets a setpoint for the
+//! length of a period: within its speed limits, above the floor, and no further against a force than
+//! the force guard allows.
 
 use crate::cell::Cell;
 use crate::cell::action::Action;
@@ -9,9 +10,22 @@ use crate::cell::setpoint::NUMBERS;
 use crate::{Error, Result};
 
 impl Cell {
-    pub(super) fn command(&mut self, action: Option<&Action>, log: &mut PeriodLog) -> Result<()> {
+    /// Takes an action in; one with an error changes nothing.
+    pub(super) fn take(&mut self, action: Option<&Action>) -> Result<()> {
         if let Some(action) = action {
-            self.request(action)?;
+            self.check(action)?;
+        }
+        self.waiting.0.push_back(action.cloned());
+        for arm in &mut self.arms {
+            arm.state.rcm_peak = 0.0;
+        }
+        Ok(())
+    }
+
+    /// Commands the arms by the action whose delay is over.
+    pub(super) fn command(&mut self, log: &mut PeriodLog) -> Result<()> {
+        if let Some(action) = self.waiting.arrived(self.delay.periods) {
+            self.request(&action)?;
         }
         for arm in &mut self.arms {
             arm.command()?;
@@ -20,8 +34,7 @@ impl Cell {
         Ok(())
     }
 
-    /// Takes over the requests of an action; an action with an error changes nothing.
-    fn request(&mut self, action: &Action) -> Result<()> {
+    fn check(&self, action: &Action) -> Result<()> {
         let needed = NUMBERS * self.arms.len();
         if action.numbers.len() != needed {
             return Err(Error::Action {
@@ -30,6 +43,11 @@ impl Cell {
                 reason: format!("is {}; {needed} numbers, {NUMBERS} an arm", action.numbers.len()),
             });
         }
+        self.arms.iter().enumerate().try_for_each(|(k, arm)| action.check(&arm.model, NUMBERS * k))
+    }
+
+    /// Takes over the requests of an action.
+    fn request(&mut self, action: &Action) -> Result<()> {
         let wanted = self.arms.iter().enumerate().map(|(k, arm)| action.wanted(&arm.model, &arm.state, NUMBERS * k));
         let wanted: Vec<Wanted> = wanted.collect::<Result<_>>()?;
         for (arm, wanted) in self.arms.iter_mut().zip(wanted) {
@@ -43,7 +61,7 @@ impl ArmUnit {
     fn command(&mut self) -> Result<()> {
         let Self { model, drive, state } = self;
         let space = &model.workspace;
-        (state.rcm_peak, state.guarded) = (0.0, false);
+        state.guarded = false;
         let Wanted::Setpoint(wanted, _) = state.wanted else { return Ok(()) };
         let (paced, far) = space.paced(&state.commanded, &wanted, model.period);
         let (mut next, low) = space.above_floor(&paced);

@@ -1,5 +1,8 @@
 //! The stages of a control period, one module each.
 //!
+//! An action is checked at the start of the period and reaches the arms after the control delay,
+//! which may end within a later period.
+//!
 //! Tissue is stepped 60 times a second, arms 480 times. In a tissue frame the arms move first,
 //! under the tissue's load at the end of the last frame, extrapolated with the tip. Then tissue is
 //! stepped with tools that move from the tips' places at the beginning of the frame to their places
@@ -39,6 +42,7 @@ impl Cell {
     ) -> Result<CellReport> {
         let (mut clock, mut wall) = (Instant::now(), Duration::ZERO);
         let mut log = PeriodLog::default();
+<<<<<<< HEAD
         self.command(action.into(), &mut log)?;
         for frame in 0..self.frames {
             if frame > 0 {
@@ -48,6 +52,11 @@ impl Cell {
                 clock = Instant::now();
             }
             self.move_arms()?;
+=======
+        self.take(action.into())?;
+        for frame in 0..self.frames {
+            self.move_arms(frame, &mut log)?;
+>>>>>>> main
             let start = self.begin_tissue_frame();
             let World { model, state, stepper, .. } = &mut self.world;
             let tissue = stepper.step_with_loads(model, state, &self.motions, &[]);

@@ -1,16 +1,22 @@
-//! Stage 2: the arms move for a tissue frame, in physics steps, under the load of the tissue.
+//! Stage 2: the arms get their commands when the control delay is over, and move for a tissue frame,
+//! in physics steps, under the load of the tissue.
 
 use crate::cell::Cell;
 use crate::cell::arm::ArmUnit;
+use crate::cell::report::PeriodLog;
 use crate::{FRAME, Result};
 use std::time::Instant;
 
 impl Cell {
-    pub(super) fn move_arms(&mut self) -> Result<()> {
+    /// For tissue frame `frame` of the control period.
+    pub(super) fn move_arms(&mut self, frame: u32, log: &mut PeriodLog) -> Result<()> {
         let clock = Instant::now();
         let dt = FRAME / f64::from(self.physics_steps);
-        for arm in &mut self.arms {
-            for _ in 0..self.physics_steps {
+        for step in 0..self.physics_steps {
+            if frame * self.physics_steps + step == self.delay.step {
+                self.command(log)?;
+            }
+            for arm in &mut self.arms {
                 arm.step(dt)?;
             }
         }

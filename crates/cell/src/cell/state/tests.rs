@@ -4,6 +4,7 @@
 
 use super::*;
 use crate::GraspDesign;
+use crate::cell::action::{Action, ActionSpace};
 use crate::cell::arm::{ArmState, Held, Wanted};
 use crate::hold::Hold;
 use glam::DVec3;
@@ -91,9 +92,12 @@ fn hash_and_restore_carry_every_field() {
         change(&mut other);
         other
     };
-    let CellState { world: _, arms: _, waits: _, touch: _, periods: _ } = &saved;
+    let CellState { world: _, arms: _, waits: _, touch: _, waiting: _, periods: _ } = &saved;
     others.push(("waits", changed(&|s| s.waits.push(3))));
     others.push(("touch", changed(&|s| s.touch ^= true)));
+    let action = Action { space: ActionSpace::Pivots, numbers: vec![0.0; 5] };
+    others.push(("waiting", changed(&|s| s.waiting.0.push_back(None))));
+    others.push(("waiting action", changed(&|s| s.waiting.0.push_back(Some(action.clone())))));
     others.push(("periods", changed(&|s| s.periods += 1)));
     cell.step(None).unwrap();
     others.push(("world and drive", cell.save()));

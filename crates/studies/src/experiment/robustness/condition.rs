@@ -23,6 +23,8 @@ pub(super) struct Condition {
     pub number: Option<f64>,
     /// The values are even in the logarithm.
     pub log: bool,
+    /// Pictures alone differ from the scene as it is written.
+    pub pictures: bool,
     pub scene: Scene,
     pub seeds: Vec<u64>,
 }
@@ -53,6 +55,7 @@ pub(super) fn conditions(scene: &Scene, own: &RobustnessExperiment) -> Result<Ve
         value,
         number: None,
         log: false,
+        pictures: false,
         scene,
         seeds: seeds(Split::Unseen, own.episodes),
     };
@@ -69,6 +72,14 @@ pub(super) fn conditions(scene: &Scene, own: &RobustnessExperiment) -> Result<Ve
             }
             continue;
         }
+        if let Some(organ) = by.name.strip_prefix("swapped.") {
+            for source in ranges.specimens().into_iter().filter(|source| *source != scene.specimen) {
+                let mut scene = scene.clone();
+                scene.specimen.swapped.insert(organ.to_owned(), source.own_label());
+                all.push(made(&by.name, source.own_label(), scene));
+            }
+            continue;
+        }
         let Some((factor, distribution)) =
             Factor::named(&by.name).and_then(|factor| Some((factor, ranges.variation.all_factors().remove(&factor)?)))
         else {
@@ -81,7 +92,13 @@ pub(super) fn conditions(scene: &Scene, own: &RobustnessExperiment) -> Result<Ve
             let single = scene.draw(0).values.iter().filter(|v| v.factor == factor).count() == 1;
             let label = if single { by.label(true) } else { format!("{}, each number", by.label(true)) };
             let value = trocar_campaign::significant(number, 3);
-            all.push(Condition { label, number: Some(number), log: by.log, ..made(factor.name(), value, scene) });
+            all.push(Condition {
+                label,
+                number: Some(number),
+                log: by.log,
+                pictures: factor.is_of_pictures(),
+                ..made(factor.name(), value, scene)
+            });
         }
     }
     if own.together > 0 {

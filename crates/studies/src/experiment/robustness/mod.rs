@@ -14,7 +14,7 @@ use condition::{Condition, conditions};
 use result::{PolicyOutcome, RobustnessResult, RobustnessRow};
 use trocar_core::Progress;
 use trocar_report::document::Document;
-use trocar_scene::{Scene, Split, VariationSet};
+use trocar_scene::{Measure, Scene, Split, VariationSet};
 use trocar_task::policy::{POLICIES, named};
 use trocar_task::{Episode, run, scene_hash, specimen_hash};
 use trocar_workflow::{SpecimenCache, read_varied};
@@ -38,15 +38,15 @@ pub struct RobustnessExperiment {
     #[arg(long, value_name = "SET", default_value = "hard", value_parser = set)]
     pub variation: VariationSet,
     /// Values of each factor, evenly over its range.
-    #[arg(long, default_value_t = 5)]
+    #[arg(long, default_value_t = 3)]
     pub values: usize,
     /// Episodes of each controller at each value.
-    #[arg(long, default_value_t = 5)]
+    #[arg(long, default_value_t = 2)]
     pub episodes: usize,
     /// Episodes of each controller with all factors together.
-    #[arg(long, default_value_t = 20)]
+    #[arg(long, default_value_t = 10)]
     pub together: usize,
-    /// A quick look: three values, one episode of each, two with all together.
+    /// A quick look: two values, one episode of each, two with all together.
     #[arg(long)]
     pub quick: bool,
     /// Number of the first episode among the unseen ones.
@@ -68,7 +68,7 @@ impl RobustnessExperiment {
     fn options(&self) -> Result<Self> {
         let mut own = self.clone();
         if self.quick {
-            (own.values, own.episodes, own.together) = (3, 1, 2);
+            (own.values, own.episodes, own.together) = (2, 1, 2);
         }
         for (name, value, range) in [
             ("--values", own.values, 2..=MAX_VALUES),
@@ -112,10 +112,20 @@ impl Study for RobustnessExperiment {
             settings += &format!(" {:016x}", specimen_hash(&*specimens.read(source, &trocar_core::Silent)?));
         }
         settings += &format!(" {:016x}", scene_hash(&scene, 0)?);
-        let Outcomes { rows, resumed } =
-            job.trials("conditions", &settings, &all, Condition::key, own.threads, |condition, progress| {
-                row(condition, &specimens, progress)
-            })?;
+        // The controllers see no pictures: unless the task is judged by one, their episodes are those
+        // of the scene as it is written.
+        let judged = scene.program()?.measures.iter().any(|measure| matches!(measure, Measure::Visible(..)));
+        let (same, run): (Vec<&Condition>, Vec<&Condition>) = all.iter().partition(|c| c.pictures && !judged);
+        let Outcomes { mut rows, resumed } = job.trials(
+            "conditions",
+            &settings,
+            &run,
+            |c| c.key(),
+            own.threads,
+            |condition, progress| row(condition, &specimens, progress),
+        )?;
+        let written = rows.first().map_or_else(Vec::new, |row| row.policies.clone());
+        rows.extend(same.into_iter().map(|condition| with_outcomes(condition, written.clone())));
         let result = RobustnessResult {
             scene: scene.name,
             variation: own.variation.name(),
@@ -156,14 +166,18 @@ fn row(condition: &Condition, specimens: &SpecimenCache, progress: &dyn Progress
             }
         }
     }
-    Ok(RobustnessRow {
+    Ok(with_outcomes(condition, policies))
+}
+
+fn with_outcomes(condition: &Condition, policies: Vec<PolicyOutcome>) -> RobustnessRow {
+    RobustnessRow {
         factor: condition.factor.clone(),
         label: condition.label.clone(),
         value: condition.value.clone(),
         number: condition.number,
         log: condition.log,
         policies,
-    })
+    }
 }
 
 fn begin(scene: &Scene, specimens: &SpecimenCache, seed: u64) -> trocar_task::Result<Episode> {
@@ -198,7 +212,7 @@ mod tests {
     #[test]
     fn a_quick_look_is_small_and_options_are_checked() {
         let quick = options(&["--quick"]).options().unwrap();
-        assert_eq!((quick.values, quick.episodes, quick.together), (3, 1, 2));
+        assert_eq!((quick.values, quick.episodes, quick.together), (2, 1, 2));
         for (words, said) in [
             (["--values", "1"], "--values 1: it must be in [2, 50]"),
             (["--episodes", "0"], "--episodes 0: "),
@@ -213,7 +227,8 @@ mod tests {
     #[test]
     fn one_factor_has_its_values_and_all_others_are_as_written() {
         let scene = Scene::builtin("cell-a").unwrap();
-        let own = options(&["--by", "modulus,light", "--together", "0"]).options().unwrap();
+        let words = ["--by", "modulus,light", "--together", "0", "--values", "5", "--episodes", "5"];
+        let own = options(&words).options().unwrap();
         let all = conditions(&scene, &own).unwrap();
         let of = |factor: &str| -> Vec<&Condition> { all.iter().filter(|c| c.factor == factor).collect() };
         assert_eq!((of("as written").len(), of("modulus_kpa").len(), of("tint_scale").len()), (1, 5, 5));
@@ -221,6 +236,8 @@ mod tests {
         assert!((modulus[0] - 2.0).abs() < 1e-9 && (modulus[4] - 96.0).abs() < 1e-9, "{modulus:?}");
         assert!((modulus[2] - (2.0_f64 * 96.0).sqrt()).abs() < 1e-9, "in the logarithm");
         for condition in &all {
+            let pictures = ["lamp_scale", "exposure_scale", "noise_scale", "gloss_scale", "tint_scale"];
+            assert_eq!(condition.pictures, pictures.contains(&condition.factor.as_str()));
             assert_eq!(condition.seeds, [1_000_000, 1_000_001, 1_000_002, 1_000_003, 1_000_004]);
             let drawn = condition.scene.draw(1_000_000);
             let of = drawn.values.iter().filter(|v| v.factor.name() == condition.factor);
