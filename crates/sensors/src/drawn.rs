@@ -66,16 +66,32 @@ impl DrawnCell {
     /// # Errors
     /// Shapes that cannot be read; a cell of another scene.
     pub fn new(scene: &Scene, specimen: &Specimen, cell: &Cell) -> Result<Self> {
+        let mut arms = Vec::new();
+        for tool in scene.tools() {
+            let name = tool.arm.name.name();
+            arms.push((cell.arm_model(name)?.to_owned(), ArmPosture::of(cell, name)?));
+        }
+        let mut all = Self::without_cell(scene, specimen, &arms)?;
+        all.skins.update(cell)?;
+        Ok(all)
+    }
+
+    /// Of `scene` around `specimen` without a cell; `arms`: model and posture of each of the scene's
+    /// arms. The organs are as recorded.
+    ///
+    /// # Errors
+    /// Shapes that cannot be read.
+    pub fn without_cell(scene: &Scene, specimen: &Specimen, arms: &[(String, ArmPosture)]) -> Result<Self> {
         let placed = Placed::new(scene, specimen)?.specimen;
         let mut all = Self { meshes: Vec::new(), bodies: Vec::new(), arms: Vec::new(), skins: Skins::placed(&placed) };
         for prop in surroundings(&placed, scene.placement.pose(), Some(scene))? {
             let mesh = all.mesh(prop.name.to_owned(), prop.mesh, prop.appearance);
             all.bodies.push(DrawnBody { mesh, arm: None, part: DrawnPart::Fixed });
         }
-        for (k, tool) in scene.tools().iter().enumerate() {
+        for (k, (tool, (model, posture))) in scene.tools().iter().zip(arms).enumerate() {
             let name = tool.arm.name.name();
             all.arms.push(name);
-            let links = arm::links(scene, tool.arm, cell.arm_model(name)?, &cell.link_poses(name)?)?;
+            let links = arm::links(scene, tool.arm, model, &posture.links)?;
             let mut add = |part: DrawnPart, what: &str, mesh: TriMesh, appearance: Appearance| {
                 let mesh = all.mesh(format!("{name} {what}"), mesh, appearance);
                 all.bodies.push(DrawnBody { mesh, arm: Some(k), part });
@@ -89,7 +105,6 @@ impl DrawnCell {
             add(DrawnPart::Blade(1), &tool.instrument.name, upper, polished());
             add(DrawnPart::Blade(-1), &tool.instrument.name, lower, polished());
         }
-        all.skins.update(cell)?;
         Ok(all)
     }
 
@@ -112,6 +127,11 @@ impl DrawnCell {
         for arm in &self.arms {
             postures.push(ArmPosture::of(cell, arm)?);
         }
+        Ok(self.poses_of(&postures))
+    }
+
+    /// The same for arms in these postures.
+    pub fn poses_of(&self, postures: &[ArmPosture]) -> Vec<Pose> {
         let pose = |body: &DrawnBody| {
             let ArmPosture { links, gripper } = postures.get(body.arm?)?;
             match body.part {
@@ -121,6 +141,6 @@ impl DrawnCell {
                 DrawnPart::Blade(side) => Some(gripper.blade(f64::from(side))),
             }
         };
-        Ok(self.bodies.iter().filter_map(pose).collect())
+        self.bodies.iter().filter_map(pose).collect()
     }
 }

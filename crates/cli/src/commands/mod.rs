@@ -29,7 +29,7 @@ pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
         Command::Evaluate(arguments) => evaluate::run(arguments, cli.json, progress)?,
         Command::Episode(arguments) => episode::run(arguments, cli.json, progress)?,
         Command::Replay(arguments) => episode::replay_file(arguments, cli.json, progress)?,
-        Command::Export(arguments) => export::run(arguments, cli.json, cli.quiet)?,
+        Command::Export(arguments) => export::run(arguments, cli.json, cli.quiet, progress)?,
         Command::Sweep(arguments) => episode::sweep(arguments, cli.json, progress)?,
         Command::Inspect(arguments) => inspect::run(arguments, cli.json)?,
         Command::Record(arguments) => record::run(arguments, cli.json, progress)?,
