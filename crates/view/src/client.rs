@@ -29,6 +29,7 @@ impl Received {
     }
 }
 
+#[allow(clippy::needless_pass_by_value, reason = "what map_err passes")]
 fn ended(why: impl ToString) -> Error {
     Error::Connection(why.to_string())
 }

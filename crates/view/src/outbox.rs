@@ -17,6 +17,8 @@ const MAX_REPLY_BYTES: usize = 256 << 20;
 pub(crate) enum Outgoing {
     Text(Arc<str>),
     Binary(Arc<[u8]>),
+    /// The answer to a ping.
+    Pong(Arc<[u8]>),
 }
 
 impl Outgoing {
@@ -27,7 +29,7 @@ impl Outgoing {
     fn len(&self) -> usize {
         match self {
             Self::Text(text) => text.len(),
-            Self::Binary(bytes) => bytes.len(),
+            Self::Binary(bytes) | Self::Pong(bytes) => bytes.len(),
         }
     }
 }
@@ -100,7 +102,7 @@ impl Client {
     pub fn wants_now(&self, now: Instant) -> bool {
         let outbox = lock(&self.outbox);
         let hz = outbox.wants.frames_hz;
-        !outbox.closed && hz > 0.0 && outbox.due[0].is_none_or(|due| due <= now + period(hz))
+        !outbox.closed && hz > 0.0 && outbox.due[0].is_none_or(|due| due <= now + period(hz) / 2)
     }
 
     /// Waits for what is to be sent, at most for `most`.
@@ -163,7 +165,7 @@ fn period(hz: f64) -> Duration {
     Duration::from_secs_f64(1.0 / hz)
 }
 
-/// Whether something that happens `hz` times a second is due, with one period of slack for jitter.
+/// Whether something that happens `hz` times a second is due, with half a period of slack for jitter.
 fn is_due(due: &mut Option<Instant>, hz: f64, now: Instant) -> bool {
     let period = period(hz);
     let next = due.unwrap_or(now);

@@ -200,7 +200,7 @@ fn connection(mut stream: TcpStream, shared: &Arc<Shared>) {
             hello
         };
         if let Some(client) = shared.hub.join(hello) {
-            socket::serve(stream, rest, &client, &shared.hub);
+            socket::serve(&stream, rest, &client, &shared.hub);
             shared.hub.leave(client.id);
         }
         shared.clients.leave();

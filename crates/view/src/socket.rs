@@ -62,13 +62,13 @@ impl Write for WriteOnly {
 }
 
 /// Serves a client whose handshake is done until it is gone; `rest` came with the handshake.
-pub(crate) fn serve(stream: TcpStream, rest: Vec<u8>, client: &Arc<Client>, hub: &Arc<Hub>) {
+pub(crate) fn serve(stream: &TcpStream, rest: Vec<u8>, client: &Arc<Client>, hub: &Arc<Hub>) {
     let writer = stream.try_clone().and_then(|own| {
         let client = Arc::clone(client);
         std::thread::Builder::new().name("view-writer".to_owned()).spawn(move || write(own, &client))
     });
     if writer.is_ok() {
-        read(&stream, rest, client, hub);
+        read(stream, rest, client, hub);
     }
     client.close();
     if let Ok(writer) = writer {
@@ -94,6 +94,7 @@ fn write(stream: TcpStream, client: &Client) {
         }
         let message = match client.next(PING_EVERY) {
             Next::Reply(Outgoing::Text(text)) => Message::text(&*text),
+            Next::Reply(Outgoing::Pong(bytes)) => Message::Pong(bytes.to_vec().into()),
             Next::Reply(Outgoing::Binary(bytes)) => Message::binary(bytes.to_vec()),
             Next::Frame(frame, dropped, whole) => {
                 Message::binary(frame.message(&mut has, client.wants().value, dropped, whole))
@@ -130,7 +131,11 @@ fn read(stream: &TcpStream, rest: Vec<u8>, client: &Arc<Client>, hub: &Hub) {
     loop {
         let text = match web.read() {
             Ok(Message::Text(text)) => text,
-            Ok(Message::Ping(_) | Message::Pong(_) | Message::Frame(_)) => continue,
+            Ok(Message::Ping(bytes)) => {
+                client.reply(Outgoing::Pong(bytes.to_vec().into()));
+                continue;
+            }
+            Ok(Message::Pong(_) | Message::Frame(_)) => continue,
             Ok(Message::Close(_)) => return,
             Ok(Message::Binary(_)) => {
                 let why = "clients send text; binary messages come from the server".to_owned();

@@ -83,6 +83,7 @@ pub struct ViewBenchResult {
     pub machine: Machine,
 }
 
+#[allow(clippy::needless_pass_by_value, reason = "what map_err passes")]
 fn failed(why: impl ToString) -> Error {
     Error::Mismatch(why.to_string())
 }

@@ -420,6 +420,7 @@ fn folder_of(plan: &Plan) -> Option<Folder> {
     }
 }
 
+#[allow(clippy::needless_pass_by_value, reason = "what map_err passes")]
 fn internal(why: Error) -> Mistake {
     Mistake("internal", why.to_string())
 }
