@@ -24,6 +24,13 @@ test("driving", { skip }, async (t) => {
 
   const hold = (key: string) => page.keyboard.down(key);
   const letGo = (key: string) => page.keyboard.up(key);
+  /** Presses the clutch with the focus in the view, until the arm is driven. */
+  const engage = async () => {
+    await letGo("Space");
+    await at(page, "view").focus();
+    await hold("Space");
+    await expectSoon(() => inside(page, ({ drive }) => drive.operator.clutched), true, "the clutch is held");
+  };
   const servo = () => server.of("servo_cr");
 
   await t.test("a device is of no use before each of its axes was moved both ways", async () => {
@@ -112,9 +119,7 @@ test("driving", { skip }, async (t) => {
   });
 
   await t.test("a lost focus lets go, and the held key does not take the arm again", async () => {
-    await at(page, "view").focus();
-    await hold("Space");
-    await expectSoon(() => inside(page, ({ drive }) => drive.clutched), true, "clutched");
+    await engage();
     await page.evaluate(() => window.dispatchEvent(new Event("blur")));
     await says(page, "drive-note", /lost the focus/);
     const count = servo().length;
@@ -124,9 +129,7 @@ test("driving", { skip }, async (t) => {
   });
 
   await t.test("a hidden page lets go", async () => {
-    await at(page, "view").focus();
-    await hold("Space");
-    await expectSoon(() => inside(page, ({ drive }) => drive.clutched), true, "clutched");
+    await engage();
     await page.evaluate(() => {
       Object.defineProperty(document, "hidden", { value: true, configurable: true });
       document.dispatchEvent(new Event("visibilitychange"));
@@ -137,9 +140,7 @@ test("driving", { skip }, async (t) => {
   });
 
   await t.test("no picture for a second lets go", async () => {
-    await at(page, "view").focus();
-    await hold("Space");
-    await expectSoon(() => inside(page, ({ drive }) => drive.clutched), true, "clutched");
+    await engage();
     server.silent = true;
     await says(page, "drive-note", /No new picture/);
     server.silent = false;
@@ -149,6 +150,7 @@ test("driving", { skip }, async (t) => {
   await t.test("paused, the clutch does not engage and says why", async () => {
     await at(page, "play").click();
     await eventually(() => !server.playing, "pause");
+    await letGo("Space");
     await at(page, "view").focus();
     await hold("Space");
     await says(page, "drive-note", /paused/);

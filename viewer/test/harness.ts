@@ -30,7 +30,7 @@ export interface Inside {
     canvas: HTMLCanvasElement;
   };
   show: { drawn: Record<string, unknown> };
-  drive: { clutched: boolean; mouse: { tipOnScreen(arm: number): { x: number; y: number } | null } };
+  drive: { operator: { clutched: boolean }; mouse: { tipOnScreen(arm: number): { x: number; y: number } | null } };
 }
 
 /** Evaluates a function of the page's objects in the page. */

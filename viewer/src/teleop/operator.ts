@@ -10,7 +10,7 @@ import type { AxisTest } from "./axis-test.ts";
 /** How often devices are read and commands are sent (ms). */
 const TICK_MS = 16;
 /** A tick that comes this late means that the page stood still: the clutch is let go (ms). */
-const STALLED_MS = 250;
+const STALLED_MS = 1000;
 /** Frames that are this old are no picture to steer by (ms). */
 const STALE_MS = 1000;
 
