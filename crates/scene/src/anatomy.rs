@@ -24,14 +24,14 @@ pub struct SpecimenSource {
     /// Seed of the phantom's anatomy.
     #[serde(default = "first_seed")]
     pub seed: u32,
-    /// Organs of other specimens in the place of its own: by the organ's name, a specimen folder or
-    /// a phantom with its seed, as phantom-a:7.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub swapped: BTreeMap<String, String>,
     /// Approximate largest number of elements of each organ of a phantom; the reconstruction's
     /// default, 50,000, if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_elements: Option<u32>,
+    /// Organs of other specimens in the place of its own: by the organ's name, a specimen folder or
+    /// a phantom with its seed, as phantom-a:7.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub swapped: BTreeMap<String, String>,
 }
 
 fn first_seed() -> u32 {
@@ -58,22 +58,18 @@ impl SpecimenSource {
 
     /// A specimen folder.
     pub fn folder(path: &str) -> Self {
-        Self {
-            path: Some(path.to_owned()),
-            phantom: None,
-            seed: first_seed(),
-            max_elements: None,
-            swapped: BTreeMap::new(),
-        }
+        let swapped = BTreeMap::new();
+        Self { path: Some(path.to_owned()), phantom: None, seed: first_seed(), max_elements: None, swapped }
     }
 
     /// The same with at most so many elements an organ.
+    #[must_use]
     pub fn with_max_elements(self, max_elements: Option<u32>) -> Self {
         Self { max_elements, ..self }
     }
 
-    /// What it is called in results: a folder's path, or a phantom with its seed, as `phantom-a:1`,
-    /// and with its largest number of elements where that is not the default, as
+    /// What it is called in results: a folder's path, or a phantom with its seed, as
+    /// `phantom-a:1`, and with its largest number of elements where that is not the default, as
     /// `phantom-c:1:14000`; then the organs of others, as `phantom-a:1 with appendix of
     /// phantom-a:7`.
     pub fn label(&self) -> String {

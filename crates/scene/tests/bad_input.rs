@@ -302,7 +302,7 @@ fn names() {
         Case(
             "phantom = \"phantom-a\" ",
             "max_elements = 999§\nphantom = \"phantom-a\" ",
-            "specimen.max_elements is 999; must be in [1000, 1000000]",
+            "specimen.max_elements is 999; it must be in [1000, 1000000]",
         ),
         Case(
             "phantom = \"phantom-a\" ",
