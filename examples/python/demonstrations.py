@@ -36,8 +36,8 @@ FIXED = ("--variation", "none")
 #: operator comes from behind (m).
 DEPTH, BACK = 0.0115, 0.025
 #: Speed of the hand (m/s), height of the lift (m), and times of closing and holding (s).
-SPEED, LIFT = 0.03, 0.0115
-CLOSE_S, LIFT_S, HOLD_S = 1.8, 1.5, 2.5
+SPEED, LIFT = 0.03, 0.0145
+CLOSE_S, LIFT_S, HOLD_S = 1.2, 1.5, 3.0
 #: Trembling of the hand: amplitude (m) and frequency (Hz).
 TREMOR, TREMOR_HZ = 3e-4, 9.0
 
@@ -152,11 +152,14 @@ def demonstrate(options):
     with teleop.launch(str(options.output / "scene.toml"), *words, program=options.program) as session:
         session.ready()
         device = HeldDevice(DEVICE)
-        with teleop.HapticLoop(session, "left", device, frame="world") as loop:
+        gain = 0.0 if options.no_force else 1.0
+        with teleop.HapticLoop(session, "left", device, frame="world", gain=gain) as loop:
             while kept < options.episodes and seed < 3 * options.episodes:
                 device.peak = 0.0
-                operator = Operator(session, device, loop)
+                session.latest.pop("measured", None)
                 session.play()
+                session.wait(lambda: "measured" in session.latest, "a measurement")
+                operator = Operator(session, device, loop)
                 passed = operator.lift()
                 operator.rest()
                 session.pause()
@@ -186,6 +189,7 @@ def main():
     parser.add_argument("--tests", type=int, default=20, help="episodes of each policy")
     parser.add_argument("--program", default="trocar")
     parser.add_argument("--speed", type=float, default=1.0, help="simulated over wall time")
+    parser.add_argument("--no-force", action="store_true", help="the device gets no force")
     parser.add_argument("--threads", type=int, default=0, help="of trocar view (default: all)")
     parser.add_argument("-o", "--output", type=Path, default=Path("lifts"))
     options = parser.parse_args()

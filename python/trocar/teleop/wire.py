@@ -98,8 +98,14 @@ class Wire:
         self._open = ExitStack()
         try:
             self._socket = self._open.enter_context(
+                # The server pings.
                 websockets.sync.client.connect(
-                    target, max_size=None, compression=None, open_timeout=TIMEOUT_S, proxy=None
+                    target,
+                    max_size=None,
+                    compression=None,
+                    open_timeout=TIMEOUT_S,
+                    ping_interval=None,
+                    proxy=None,
                 )
             )
         except (OSError, TimeoutError, WebSocketException) as why:
