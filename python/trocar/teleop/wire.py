@@ -1,4 +1,4 @@
-"""The wire of `trocar view`: a WebSocket with JSON texts and binary messages (docs/guides/view.md).
+"""The wire of `trocar view` (docs/guides/view-wire.md): JSON texts and binary messages.
 
 `Wire` connects and takes messages apart. `trocar.teleop.Session` is what programs use.
 """
