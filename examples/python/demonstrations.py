@@ -5,8 +5,8 @@
 
 Nobody has to be there: a scripted operator looks at where the organ lies and moves a simulated
 haptic device with a hand of limited stiffness that trembles. Its motion goes over the WebSocket of
-`trocar view`, as that of a real device would, and the force of tissue comes back and moves the hand.
-Ten episodes whose gates are passed are kept. `trocar export` makes a dataset of them,
+`trocar view`, as that of a real device would, and the force of tissue comes back and moves the
+hand. Ten episodes whose gates are passed are kept. `trocar export` makes a dataset of them,
 `train_from_pictures.py --observe states` clones it, and `trocar evaluate` compares the clone with
 `scripted` and `noise`, on starts of the arms that no demonstration had.
 
@@ -14,7 +14,6 @@ Nothing is random but the seeds, yet wall time decides when a command arrives: t
 """
 
 import argparse
-import json
 import os
 import subprocess
 import sys
@@ -34,10 +33,12 @@ SCENE, SECONDS = HERE / "lift_from_pictures.toml", 14.0
 FIXED = ("--variation", "none")
 #: Way from the jaw's pivot to the middle of what it takes, and way along the shaft by which the
 #: operator comes from behind (m).
-DEPTH, BACK = 0.0115, 0.025
+DEPTH, BACK = 0.0141, 0.025
 #: Speed of the hand (m/s), height of the lift (m), and times of closing and holding (s).
 SPEED, LIFT = 0.03, 0.0145
-CLOSE_S, LIFT_S, HOLD_S = 1.2, 1.5, 3.0
+CLOSE_S, LIFT_S, HOLD_S = 1.0, 1.5, 3.0
+#: The jaws close in this part of the time, and are waited for in the rest.
+SNAP = 3.0
 #: Trembling of the hand: amplitude (m) and frequency (Hz).
 TREMOR, TREMOR_HZ = 3e-4, 9.0
 
@@ -72,11 +73,16 @@ class Operator:
         scene = session.latest["scene"].head
         (port,) = [p for p in scene["ports"] if p["name"] == "left"]
         self.port = np.array(port["centre_m"])
-        organs = session.latest["organs"]
-        names = [o["name"] for o in organs.head["organs"]]
-        organ = organs.head["organs"][names.index(scene["task"]["organ"])]
-        self.organ = np.asarray(organs.arrays[organ["rest"]], float)
-        self.pins = np.asarray(organs.arrays[organ["pins"]], float) if organ["pins"] else None
+        names = [o["name"] for o in session.latest["organs"].head["organs"]]
+        organ = names.index(scene["task"]["organ"])
+        # The first frame after a subscription has every organ.
+        session.latest.pop("frame", None)
+        session.subscribe(frames_hz=5)
+        session.wait(lambda: "frame" in session.latest, "a frame")
+        session.subscribe(frames_hz=0)
+        head, arrays = session.latest["frame"]
+        (part,) = [o for o in head["organs"] if o["organ"] == organ]
+        self.organ = np.array(part["low"]) + np.array(part["step"]) * arrays[part["positions"]]
 
     def grasp(self):
         """Tip pose for a grasp at the organ's middle, across it, from the port."""
@@ -111,15 +117,17 @@ class Operator:
             (up, up, (1.0, 1.0), (0.0, 0.0), HOLD_S),
         ]
         device.clutch = True
-        for a, b, share, jaw, seconds in ways:
-            seconds = seconds or max(0.7, float(np.linalg.norm(b - a)) / SPEED)
+        for a, b, share, jaw, given in ways:
+            seconds = given or max(0.7, float(np.linalg.norm(b - a)) / SPEED)
             begun = self.now()
             while (done := (self.now() - begun) / seconds) < 1.0:
                 if self.session.status.get("passed") or self.session.status.get("end"):
                     break
                 eased = done * done * (3.0 - 2.0 * done)
-                self.move(a + eased * (b - a), (share[0] + eased * (share[1] - share[0])) * rotation)
-                device.jaw = jaw[0] + done * (jaw[1] - jaw[0])
+                self.move(
+                    a + eased * (b - a), (share[0] + eased * (share[1] - share[0])) * rotation
+                )
+                device.jaw = jaw[0] + min(1.0, SNAP * done) * (jaw[1] - jaw[0])
                 time.sleep(0.004)
         return bool(self.session.status.get("passed"))
 
@@ -146,10 +154,19 @@ class Operator:
 
 def demonstrate(options):
     """Keeps episodes until there are enough. Returns the next seed."""
-    words = ["--policy", "operator", "--paused", "--record", str(options.output / "demonstrations"), *FIXED]
+    words = [
+        "--policy",
+        "operator",
+        "--paused",
+        "--record",
+        str(options.output / "demonstrations"),
+        *FIXED,
+    ]
     words += ["--threads", str(options.threads), "--speed", str(options.speed)]
     kept, seed = 0, 0
-    with teleop.launch(str(options.output / "scene.toml"), *words, program=options.program) as session:
+    with teleop.launch(
+        str(options.output / "scene.toml"), *words, program=options.program
+    ) as session:
         session.ready()
         device = HeldDevice(DEVICE)
         gain = 0.0 if options.no_force else 1.0
@@ -163,10 +180,16 @@ def demonstrate(options):
                 passed = operator.lift()
                 operator.rest()
                 session.pause()
+                rows = session.history("lift_mm", "follow", "slip_mm")
                 reply = session.record("keep" if passed else "discard")
                 kept, seed = kept + passed, seed + 1
                 told = reply.get("path") or "discarded"
-                print(f"{told}: greatest force {device.peak:.2f} N", flush=True)
+                print(
+                    f"{told}: lift {rows['lift_mm'].max():.1f} mm, "
+                    f"follow {rows['follow'][-1]:.2f}, slip {rows['slip_mm'].max():.1f} mm, "
+                    f"greatest force {device.peak:.2f} N",
+                    flush=True,
+                )
             print(f"{kept} of {seed} kept; {loop.late} of {loop.steps} samples late", flush=True)
     return seed
 
@@ -209,10 +232,9 @@ def main():
                 "--seeds", 0, "--steps", options.steps)  # fmt: skip
     print(f"cloned in {spent:.0f} s")
     clone = f"cloned=python:{out / 'cloned/policies.py'}:states_0"
-    run(program, "evaluate", out / "scene.toml", *FIXED, "--seed", seed, "--episodes", options.tests,
-        "--policy", clone, "--policy", "scripted", "--policy", "noise", "-o", out / "campaign")  # fmt: skip
-    table = json.loads((out / "campaign/campaign.json").read_text())
-    print(json.dumps(table.get("policies", table), indent=1)[:2000])
+    policies = [word for name in (clone, "scripted", "noise") for word in ("--policy", name)]
+    words = ["--seed", seed, "--episodes", options.tests, "-o", out / "campaign"]
+    run(program, "evaluate", out / "scene.toml", *FIXED, *policies, *words)
 
 
 if __name__ == "__main__":
