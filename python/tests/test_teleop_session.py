@@ -5,6 +5,7 @@ import struct
 import subprocess
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -272,3 +273,55 @@ def test_an_operator_feels_an_organ_of_the_program(viewer):
             time.sleep(0.5)
             assert device.active < 1e-6
         assert not session.refusals, session.refusals
+
+
+def blocks():
+    """The Python of the guide."""
+    guide = (Path(__file__).parents[2] / "docs/guides/teleoperation.md").read_text()
+    return [part.partition("```")[0] for part in guide.split("```python\n")[1:]]
+
+
+def test_the_bridges_of_the_guide_are_short_and_compile():
+    for code in blocks():
+        compile(code, "guide", "exec")
+        assert len(code.splitlines()) <= 50
+
+
+def test_the_bridge_to_an_inverse3_speaks_with_its_service():
+    """With a service that was written after its documentation: no device was there."""
+    told = []
+
+    def service(connection):
+        state = {"cursor_position": {"x": 0.1, "y": 0.2, "z": 0.3}}
+        grip = {
+            "orientation": {"w": 1.0, "x": 0.0, "y": 0.0, "z": 0.0},
+            "buttons": {"a": True, "b": False, "c": False},
+        }
+        connection.send(
+            json.dumps(
+                {
+                    "inverse3": [{"device_id": "0042", "state": state}],
+                    "wireless_verse_grip": [{"device_id": "61", "state": grip}],
+                }
+            )
+        )
+        told.append(json.loads(connection.recv()))
+
+    (code,) = [one for one in blocks() if "class Inverse3" in one]
+    with serve(service, "127.0.0.1", 0) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        port = server.socket.getsockname()[1]
+        place = {}
+        exec(code.partition("# The device's")[0].replace("10001", str(port)), place)
+        device = place["Inverse3"]()
+        state = device.read()
+        assert state.position.tolist() == [0.1, 0.2, 0.3] and state.clutch and state.jaw == 1.0
+        device.write(np.array([1.0, 2.0, 3.0]), np.zeros(3))
+        with pytest.raises(OSError, match="is gone"):
+            for _ in range(20):
+                device.read()
+        server.shutdown()
+    (command,) = told
+    (arm,) = command["inverse3"]
+    assert arm["device_id"] == "0042"
+    assert arm["commands"]["set_cursor_force"]["values"] == {"x": 1.0, "y": 2.0, "z": 3.0}

@@ -1,4 +1,4 @@
-"""The wire of `trocar view`: a WebSocket with JSON texts and binary messages (docs/guides/view.md).
+"""The wire of `trocar view` (docs/guides/view-wire.md): JSON texts and binary messages.
 
 `Wire` connects and takes messages apart. `trocar.teleop.Session` is what programs use.
 """
@@ -98,8 +98,14 @@ class Wire:
         self._open = ExitStack()
         try:
             self._socket = self._open.enter_context(
+                # The server pings.
                 websockets.sync.client.connect(
-                    target, max_size=None, compression=None, open_timeout=TIMEOUT_S, proxy=None
+                    target,
+                    max_size=None,
+                    compression=None,
+                    open_timeout=TIMEOUT_S,
+                    ping_interval=None,
+                    proxy=None,
                 )
             )
         except (OSError, TimeoutError, WebSocketException) as why:
