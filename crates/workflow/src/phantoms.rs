@@ -1,6 +1,7 @@
 //! Phantoms as specimens: recorded, unless an earlier run left the recording, and reconstructed.
 
 use crate::reconstruct::reconstruct_recording;
+use crate::specimen_scene::source;
 use crate::{Error, Result};
 use std::fs::File;
 use std::io::ErrorKind;
@@ -85,6 +86,22 @@ pub fn specimen(
 /// A specimen that cannot be read or made.
 pub fn scene_specimen(scene: &Scene, phantoms: &Path, progress: &dyn Progress) -> Result<Specimen> {
     source_specimen(&scene.specimen, &scene.folder, phantoms, progress)
+}
+
+/// The specimen of the scene of a recorded episode: the scene's, or the one in `folder`, which was
+/// moved, with the same organs of others.
+///
+/// # Errors
+/// As [`scene_specimen`].
+pub(crate) fn recorded_specimen(
+    scene: &Scene,
+    folder: Option<&Path>,
+    phantoms: &Path,
+    progress: &dyn Progress,
+) -> Result<Specimen> {
+    let Some(folder) = folder else { return scene_specimen(scene, phantoms, progress) };
+    let source = SpecimenSource { swapped: scene.specimen.swapped.clone(), ..source(folder) };
+    source_specimen(&source, &scene.folder, phantoms, progress)
 }
 
 fn kept_in(phantoms: &Path, name: &str, seed: u32) -> PathBuf {
