@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use trocar_core::Progress;
 use trocar_render::{Picture, RenderSettings};
 use trocar_scene::{Frame as SceneFrame, Imaging, Scene, View};
-use trocar_sensors::CameraRig;
+use trocar_sensors::{ArmPosture, CameraRig, DrawnCell};
 use trocar_specimen::Specimen;
 use trocar_task::{EPISODE_FILE, EpisodeFile, specimen_hash};
 
@@ -110,6 +110,20 @@ impl RecordedEpisode {
         &self.scene
     }
 
+    /// The cell as meshes and poses, the arms as they are now.
+    ///
+    /// # Errors
+    /// Shapes that cannot be read.
+    pub fn drawn_cell(&self) -> Result<DrawnCell> {
+        Ok(DrawnCell::without_cell(&self.scene, &self.specimen, &self.arms())?)
+    }
+
+    /// Model and posture of each arm now.
+    fn arms(&self) -> Vec<(String, ArmPosture)> {
+        let models = self.frames.header.arms.iter().map(|a| a.model.clone());
+        models.zip(self.now.arms.iter().cloned()).collect()
+    }
+
     /// The present frame.
     pub fn now(&self) -> &SurfaceFrame {
         &self.now
@@ -137,9 +151,7 @@ impl RecordedEpisode {
         let rig = match self.rig.take() {
             Some(rig) => rig,
             None => {
-                let models = self.frames.header.arms.iter().map(|a| a.model.clone());
-                let arms: Vec<_> = models.zip(self.now.arms.iter().cloned()).collect();
-                let mut rig = CameraRig::without_cell(&self.scene, &self.specimen, &arms)?;
+                let mut rig = CameraRig::without_cell(&self.scene, &self.specimen, &self.arms())?;
                 rig.show(&self.now.organs, true, &self.now.arms)?;
                 rig
             }
