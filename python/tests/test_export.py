@@ -25,13 +25,12 @@ SIZE = (48, 64)
 
 
 @pytest.fixture(scope="module")
-def lifts(lift_scene, tmp_path_factory):
-    """A campaign of a lift that passes and of a policy that does not, with surfaces."""
-    folder = tmp_path_factory.mktemp("lifts") / "campaign"
-    policies = ["scripted", "random"]
-    campaign.run(
-        str(lift_scene), policies, folder, episodes=1, variation="none", workers=1, surfaces=True
-    )
+def lifts(lift_scene, short_scene, tmp_path_factory):
+    """A lift that passes, and an episode too short to pass, with surfaces."""
+    folder = tmp_path_factory.mktemp("lifts")
+    for scene, policy in ((lift_scene, "scripted"), (short_scene, "random")):
+        options = {"episodes": 1, "variation": "none", "workers": 1, "surfaces": True}
+        campaign.run(str(scene), [policy], folder / policy, **options)
     return folder
 
 
@@ -129,7 +128,7 @@ def test_what_did_not_pass_is_left_out_unless_it_is_asked_for(lifts, tmp_path):
     made = export.export([lifts], tmp_path / "all", cameras=[], failed=True)
     assert (made["episodes"], made["cameras"]) == (2, [])
     with pytest.raises(ValueError, match="none of 1 episodes passed; --all"):
-        export.export([lifts / "episodes/random"], tmp_path / "none")
+        export.export([lifts / "random"], tmp_path / "none")
 
 
 def test_wrong_requests_are_refused_by_name(lifts, dataset, tmp_path):
@@ -142,7 +141,7 @@ def test_wrong_requests_are_refused_by_name(lifts, dataset, tmp_path):
     with pytest.raises(ValueError, match=r"cameras: 'mine' is unknown; .* has endoscope"):
         export.export([lifts], tmp_path / "out", cameras=["mine"])
     broken = tmp_path / "broken"
-    shutil.copytree(lifts / "episodes/scripted/000000", broken)
+    shutil.copytree(lifts / "scripted/episodes/scripted/000000", broken)
     surfaces = bytearray((broken / "surfaces.trocar").read_bytes())
     surfaces[-40] ^= 1
     (broken / "surfaces.trocar").write_bytes(surfaces)
@@ -156,7 +155,7 @@ def test_the_program_exports_and_an_episode_without_surfaces_is_replayed(
     lifts, file, program, tmp_path
 ):
     alone = tmp_path / "alone"
-    shutil.copytree(lifts / "episodes/scripted/000000", alone)
+    shutil.copytree(lifts / "scripted/episodes/scripted/000000", alone)
     (alone / "surfaces.trocar").unlink()
     package = str(Path(trocar.__file__).parents[1])
     environment = os.environ | {"PYTHONPATH": package, "TROCAR_PYTHON": sys.executable}
