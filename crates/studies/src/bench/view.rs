@@ -126,7 +126,7 @@ impl Driver<'_> {
     /// and its periods.
     fn episode(&mut self, seed: u64, watched: bool) -> Result<(f64, u64)> {
         self.begin(seed, "scripted", 0.0)?;
-        let watcher = watched.then(|| Watcher::start(self.server.wire())).transpose()?;
+        let watcher = watched.then(|| Watcher::start(&self.server.wire())).transpose()?;
         let before = self.server.periods();
         let clock = Instant::now();
         self.ask(json!({"type": "play"}))?;
@@ -157,8 +157,8 @@ struct Frames {
 
 impl Watcher {
     /// Connects, and waits for the first frame.
-    fn start(wire: String) -> Result<Self> {
-        let mut client = Client::connect(&wire).map_err(failed)?;
+    fn start(wire: &str) -> Result<Self> {
+        let mut client = Client::connect(wire).map_err(failed)?;
         client.wait(Duration::from_secs(60), |m| m.kind() == "frame").map_err(failed)?;
         let stop = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
         let own = std::sync::Arc::clone(&stop);
@@ -290,7 +290,7 @@ impl Study for ViewBench {
             factors.push(1.0 / 30.0 / walls[0]);
         }
         driver.begin(self.seed, "scripted", 1.0)?;
-        let watcher = Watcher::start(server.wire())?;
+        let watcher = Watcher::start(&server.wire())?;
         driver.ask(json!({"type": "play"}))?;
         driver.ended(Instant::now())?;
         let frames = watcher.stop()?;
