@@ -72,6 +72,13 @@ def dataset(lifts, tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope="module")
+def file(lifts, tmp_path_factory):
+    path = tmp_path_factory.mktemp("robomimic") / "lifts.hdf5"
+    export.export([lifts], path, layout="robomimic", cameras=["endoscope"], size=SIZE)
+    return path
+
+
 def test_a_lerobot_dataset_holds_what_an_environment_shows(dataset, seen, tmp_path):
     states, pictures, actions, _ = seen
     info = json.loads((dataset / "meta/info.json").read_text())
@@ -90,12 +97,10 @@ def test_a_lerobot_dataset_holds_what_an_environment_shows(dataset, seen, tmp_pa
     assert np.abs(video - wanted).mean() < 0.5 * np.abs(wanted - pictures[:-1]).mean()
 
 
-def test_a_robomimic_file_holds_what_an_environment_shows(lifts, seen, tmp_path):
+def test_a_robomimic_file_holds_what_an_environment_shows(file, seen):
     states, pictures, actions, rewards = seen
-    path = tmp_path / "lifts.hdf5"
-    export.export([lifts], path, layout="robomimic", cameras=["endoscope"], size=SIZE)
-    with h5py.File(path) as file:
-        data = file["data"]
+    with h5py.File(file) as opened:
+        data = opened["data"]
         kwargs = json.loads(data.attrs["env_args"])
         assert kwargs["env_name"] == "trocar/GraspLift-v0" and kwargs["env_kwargs"]["normalize"]
         assert list(data) == ["demo_0"] and data.attrs["total"] == len(actions)
@@ -112,14 +117,12 @@ def test_a_robomimic_file_holds_what_an_environment_shows(lifts, seen, tmp_path)
             assert np.abs(shown.astype(float) - wanted).mean() < 0.05
 
 
-def test_robomimic_reads_its_file(lifts, tmp_path):
+def test_robomimic_reads_its_file(file, seen):
     robomimic = pytest.importorskip("robomimic.utils.dataset", reason="needs robomimic")
-    path = tmp_path / "lifts.hdf5"
-    made = export.export([lifts], path, layout="robomimic", cameras=[])
     read = robomimic.SequenceDataset(
-        str(path), obs_keys=("state",), dataset_keys=("actions",), seq_length=4
+        str(file), obs_keys=("state",), dataset_keys=("actions",), seq_length=4
     )
-    assert len(read) == made["frames"]
+    assert len(read) == len(seen[2]) and read[0]["obs"]["state"].shape == (4, 47)
 
 
 def test_what_did_not_pass_is_left_out_unless_it_is_asked_for(lifts, tmp_path):
@@ -143,26 +146,30 @@ def test_wrong_requests_are_refused_by_name(lifts, dataset, tmp_path):
     surfaces = bytearray((broken / "surfaces.trocar").read_bytes())
     surfaces[-40] ^= 1
     (broken / "surfaces.trocar").write_bytes(surfaces)
-    with pytest.raises(ValueError, match=r"surfaces\.trocar: was changed after it was written"):
-        export.export([broken], tmp_path / "out", size=SIZE)
+    for layout in export.LAYOUTS:
+        with pytest.raises(ValueError, match=r"surfaces\.trocar: was changed after it was written"):
+            export.export([lifts, broken], tmp_path / "out", layout=layout, size=SIZE)
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["broken"]
 
 
 def test_the_program_exports_and_an_episode_without_surfaces_is_replayed(
-    lifts, dataset, program, tmp_path
+    lifts, file, program, tmp_path
 ):
     alone = tmp_path / "alone"
     shutil.copytree(lifts / "episodes/scripted/000000", alone)
     (alone / "surfaces.trocar").unlink()
     package = str(Path(trocar.__file__).parents[1])
     environment = os.environ | {"PYTHONPATH": package, "TROCAR_PYTHON": sys.executable}
-    words = [program, "export", alone, "-o", tmp_path / "out", "--json", "--quiet"]
+    words = [program, "export", alone, "-o", tmp_path / "out.hdf5", "--json", "--quiet"]
+    words += ["--format", "robomimic"]
     words += ["--cameras", "endoscope", "--size", f"{SIZE[1]}x{SIZE[0]}"]
     done = subprocess.run(words, capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["episodes"] == 1
     # The same pictures as of the surfaces that were kept while it ran.
-    one, other = (next(folder.rglob("*.mp4")) for folder in (dataset, tmp_path / "out"))
-    assert one.read_bytes() == other.read_bytes()
+    with h5py.File(file) as one, h5py.File(tmp_path / "out.hdf5") as other:
+        for name in ("actions", "rewards", "obs/state", "obs/endoscope_image"):
+            assert np.array_equal(*(f[f"data/demo_0/{name}"] for f in (one, other))), name
     done = subprocess.run(words, capture_output=True, text=True, env=environment)
     assert done.returncode == 2 and "exists; choose another" in done.stderr
 

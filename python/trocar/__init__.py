@@ -7,6 +7,7 @@
 - `trocar.envs`: the environments and their options.
 - `trocar.datasets`: demonstrations as LeRobot and robomimic files.
 - `trocar.export`: recorded episodes as datasets, rendered after the fact.
+- `trocar.teleop`: the instruments in the hands of a device, with force.
 - `trocar.calibration`: camera calibration.
 - `trocar.serve`: serves a Python policy to `trocar evaluate`.
 - `trocar.campaign`: campaigns on this machine or on a Ray cluster.

@@ -165,6 +165,7 @@ class Recorded:
         *,
         phantoms: str | PathLike[str],
         specimen: str | PathLike[str] | None = None,
+        plain_light: bool = False,
     ) -> None: ...
     @property
     def header(self) -> str: ...

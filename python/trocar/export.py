@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -53,9 +54,9 @@ def find_episodes(sources: Sequence[str | os.PathLike[str]]) -> list[Path]:
 class _Episode:
     """A recorded episode with its pictures."""
 
-    def __init__(self, folder: Path, phantoms: Path, specimen: Path | None):
+    def __init__(self, folder: Path, **options: Any):
         self.folder = folder
-        self.native = Recorded(folder, phantoms=phantoms, specimen=specimen)
+        self.native = Recorded(folder, **options)
         self.header: dict[str, Any] = json.loads(self.native.header)
         spaces = {space for space, _ in self.native.actions()} or {"pivots"}
         if len(spaces) > 1:
@@ -189,6 +190,7 @@ def export(
     cameras: Sequence[str] | None = None,
     size: tuple[int, int] | None = None,
     failed: bool = False,
+    plain_light: bool = False,
     specimen: str | os.PathLike[str] | None = None,
     phantoms: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
@@ -199,9 +201,10 @@ def export(
     - `cameras`: of the scene (default: all but the recording camera); an empty list for none.
     - `size`: height and width of all pictures (px) (default: each camera's `policy_size_px`).
     - `failed`: also export episodes that did not pass.
+    - `plain_light`: light, exposure, gloss and tint of the scene, not those that were drawn.
     - `specimen`: folder of the specimen, if it was moved.
 
-    ValueError for what cannot be exported, by its folder; the episodes before are then written.
+    ValueError for what cannot be exported, by its folder. `output` appears whole or not at all.
     """
     if layout not in LAYOUTS:
         raise ValueError(f"format: '{layout}' is unknown; it must be {' or '.join(LAYOUTS)}")
@@ -209,10 +212,48 @@ def export(
     if output.exists() and (not output.is_dir() or any(output.iterdir())):
         raise ValueError(f"{output}: exists; choose another")
     folders = find_episodes(sources)
-    kept = Path(phantoms) if phantoms is not None else phantoms_folder()
-    place = Path(specimen) if specimen is not None else None
+    options = {
+        "phantoms": phantoms if phantoms is not None else phantoms_folder(),
+        "specimen": specimen,
+        "plain_light": plain_light,
+    }
     progress = progress or (lambda done, missing: None)
     progress(0, len(folders))
+    output.parent.mkdir(parents=True, exist_ok=True)
+    partial = output.with_name(f".{output.name}.partial-{os.getpid()}")
+    try:
+        made = _write(folders, partial, layout, cameras, size, failed, progress, options)
+        if output.exists():
+            # Empty.
+            output.rmdir()
+        os.replace(partial, output)
+    finally:
+        # Nothing is there after a success.
+        for path in [
+            path for path in output.parent.iterdir() if path.name.startswith(partial.name)
+        ]:
+            _remove(path)
+    return {"output": str(output), "format": layout} | made
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _write(
+    folders: list[Path],
+    output: Path,
+    layout: str,
+    cameras: Sequence[str] | None,
+    size: tuple[int, int] | None,
+    failed: bool,
+    progress: Progress,
+    options: dict[str, Any],
+) -> dict[str, Any]:
+    """Writes the dataset and returns its figures. `options` are those of `Recorded`."""
     writer: _LeRobot | _Robomimic | None = None
     first: tuple[Any, ...] | None = None
     frames, exported, notes = 0, 0, []
@@ -223,7 +264,7 @@ def export(
         if not passed and not failed:
             progress(done, len(folders))
             continue
-        episode = _Episode(folder, kept, place)
+        episode = _Episode(folder, **options)
         sizes = episode.sizes(cameras, size)
         kind = (episode.fps, episode.space, episode.limits["names"], sizes)
         if writer is None:
@@ -244,8 +285,6 @@ def export(
         )
     writer.close()
     return {
-        "output": str(output),
-        "format": layout,
         "found": len(folders),
         "episodes": exported,
         "frames": frames,
@@ -272,6 +311,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--cameras", nargs="*", metavar="NAME", help="(default: all but recording)")
     parser.add_argument("--size", type=_size, metavar="WxH", help="of all pictures (px)")
     parser.add_argument("--all", action="store_true", help="also episodes that did not pass")
+    parser.add_argument(
+        "--plain-light",
+        action="store_true",
+        help="the scene's, not what was drawn for each episode",
+    )
     parser.add_argument("--specimen", type=Path, help="specimen folder, if it was moved")
     parser.add_argument("--phantoms", type=Path, help="folder of phantoms")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -286,6 +330,7 @@ def main(arguments: list[str] | None = None) -> int:
             cameras=options.cameras,
             size=options.size,
             failed=options.all,
+            plain_light=options.plain_light,
             specimen=options.specimen,
             phantoms=options.phantoms,
             progress=None if options.quiet else bar,
@@ -294,7 +339,7 @@ def main(arguments: list[str] | None = None) -> int:
         bar.print(f"error: {why}")
         return 2
     except KeyboardInterrupt:
-        bar.print("interrupted; the episodes that are written are complete")
+        bar.print("interrupted; no partial output was left")
         return 130
     if options.json:
         print(json.dumps(made))

@@ -7,6 +7,7 @@ mod figures;
 mod peers;
 mod python;
 mod tools;
+mod viewer;
 
 use std::process::{Command, ExitCode};
 
@@ -28,8 +29,9 @@ const EXAMPLES: [&str; 5] = ["gravity", "grasp_lift", "two_arms", "reconstruct",
 const API_DOCS: Check =
     ("docs", &["doc", "--workspace", "--no-deps", "--release", "--locked"], &[("RUSTDOCFLAGS", "-D warnings")]);
 
-const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests, examples, docs and Python, warnings as errors
+const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests, examples, docs, Python and the page, warnings as errors
        cargo xtask python        ruff, mypy and the tests of the Python package alone (skipped without Python or network)
+       cargo xtask viewer        the page of the live view: build, unit tests, tests in headless Chromium (skipped without Node)
        cargo xtask docs          the API documentation, and the book in target/book where mdbook is installed
        cargo xtask tools         fetch the programs and libraries that some tests compare with (test does this too)
        cargo xtask peers         our stepping beside Newton and MuJoCo on one mesh (peers from PyPI; scripts from ../shared/peers)
@@ -45,6 +47,7 @@ fn main() -> ExitCode {
             test()
         }
         ["python"] => code(check_python(python::Build::Module)),
+        ["viewer"] => code(check_viewer(viewer::Tests::Browser)),
         ["docs"] => code(docs()),
         ["tools"] => {
             tools::fetch();
@@ -80,8 +83,9 @@ fn told(result: &Result<(), String>) -> bool {
 }
 
 fn test() -> ExitCode {
-    if TEST.iter().all(check) && EXAMPLES.iter().all(example) && docs() && check_python(python::Build::Workspace) {
-        eprintln!("\nformatting, lints, tests, examples, docs and Python are in order");
+    let of_rust = || TEST.iter().all(check) && EXAMPLES.iter().all(example) && docs();
+    if of_rust() && check_python(python::Build::Workspace) && check_viewer(viewer::Tests::Unit) {
+        eprintln!("\nformatting, lints, tests, examples, docs, Python and the page are in order");
         return ExitCode::SUCCESS;
     }
     ExitCode::FAILURE
@@ -127,6 +131,14 @@ fn check_python(build: python::Build) -> bool {
     let checked = python::check(build);
     if let Err(name) = checked {
         eprintln!("\nPython: {name} failed");
+    }
+    checked.is_ok()
+}
+
+fn check_viewer(tests: viewer::Tests) -> bool {
+    let checked = viewer::check(tests);
+    if let Err(name) = checked {
+        eprintln!("\nThe page: {name} failed");
     }
     checked.is_ok()
 }

@@ -28,7 +28,7 @@ const PACKAGES: [&str; 13] = [
     "pyarrow>=17",
     "opencv-python-headless>=4.10",
     "msgpack>=1.0",
-    "websockets>=13",
+    "websockets>=15",
 ];
 /// Their modules.
 const MODULES: &str =

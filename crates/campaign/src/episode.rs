@@ -8,7 +8,19 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trocar_core::Progress;
+use trocar_task::{Episode, Policy};
 use trocar_workflow::{EpisodeOutput, EpisodeRun, Error, Result};
+
+/// The policy of `spec` for `episode`. One that waits for a reply gives up when `stop` is set.
+///
+/// # Errors
+/// A policy that is unknown, or that cannot be reached or started.
+pub fn make_policy(spec: &PolicySpec, episode: &Episode, stop: &Arc<AtomicBool>) -> Result<Box<dyn Policy + Send>> {
+    if spec.is_remote() {
+        return Ok(Box::new(RemotePolicy::new(spec, episode, Arc::clone(stop), None, None)?));
+    }
+    Ok(trocar_task::policy::named(&spec.source)?)
+}
 
 /// Runs the episode `run` into the folder `output`. Its policy is anything that
 /// [`PolicySpec::parse`] accepts. A Python policy is loaded before anything is built.

@@ -30,7 +30,7 @@ pub use by::{By, Value};
 pub use campaign::{Campaign, DEFAULT_VARIATION};
 pub use curves::{Bin, Curve, Share, significant};
 pub use drawn_result::{DrawnEpisode, VariationResult};
-pub use episode::run_episode;
+pub use episode::{make_policy, run_episode};
 pub use manifest::{Job, Manifest, named_specimen};
 pub use outcomes::{distinct_outcomes, repeats};
 pub use plots::{lift_and_rcm, lifts, success_by_name, success_over};

@@ -388,6 +388,51 @@ fn episodes_have_the_specimens_that_are_drawn_for_them() {
 }
 
 #[test]
+fn organs_of_other_specimens_are_in_tables_and_in_replays() {
+    let dir = TempDir::new().unwrap();
+    let file = scene(dir.path());
+    for (name, size) in [("shorter", 0.8), ("longer", 1.2), ("unseen", 1.1)] {
+        let mut specimen = tube::two_tubes(tube::ONE_END, 4e-3);
+        let organ = &mut specimen.organs[0];
+        let points = organ.body.vertices.iter_mut().chain(&mut organ.surface.vertices).chain([&mut organ.base]);
+        points.for_each(|p| p.x *= size);
+        specimen.write(&dir.path().join(name)).unwrap();
+    }
+    let mut varied = Scene::read(&file.display().to_string()).unwrap();
+    let paths = ["tube", "shorter", "longer", "unseen"].map(str::to_owned).to_vec();
+    varied.variation.specimens = Some(Specimens { paths, phantoms: Vec::new(), seeds: [1, 1] });
+    varied.variation.swapped = vec!["tube".to_owned()];
+    std::fs::write(&file, varied.to_toml().unwrap()).unwrap();
+    let folder = dir.path().join("campaign");
+    let by = vec!["organ".to_owned()];
+    let result = Campaign { by, ..campaign(dir.path(), &["random"], 8) }.run(&folder, &Silent).unwrap();
+    assert_eq!(result.episodes, 8);
+    assert_eq!(result.by.iter().map(|c| c.name.as_str()).collect::<Vec<_>>(), ["specimen", "swapped.tube"]);
+    let text = std::fs::read_to_string(folder.join("table.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+    let at = |name: &str| rows[0].iter().position(|head| *head == name).unwrap();
+    let drawn: Vec<[&str; 2]> =
+        rows[1..].iter().map(|row| [row[at("drawn.specimen")], row[at("drawn.swapped.tube")]]).collect();
+    assert!(drawn.iter().all(|[own, other]| own != other && *other != "unseen"), "{drawn:?}");
+    let mut pairs = drawn.clone();
+    pairs.sort_unstable();
+    pairs.dedup();
+    assert!(pairs.len() > 2, "{pairs:?}");
+    // Each episode has the tube of the other one, and its replay too; from a moved folder as well.
+    for (k, [own, other]) in drawn.iter().enumerate().take(3) {
+        let episode = folder.join(format!("episodes/random/{k:06}"));
+        let result = std::fs::read_to_string(episode.join("result.json")).unwrap();
+        assert!(result.contains(&format!("\"swapped.tube\": \"{other}\"")), "{result}");
+        for place in [None, Some(dir.path().join(own))] {
+            let verdict = trocar_workflow::replay(&episode, place.as_deref(), dir.path(), 1, &Silent).unwrap();
+            assert!(verdict.same, "{own} {other}: {verdict:?}");
+        }
+        let elsewhere = dir.path().join(other);
+        assert!(!trocar_workflow::replay(&episode, Some(&elsewhere), dir.path(), 1, &Silent).unwrap().same);
+    }
+}
+
+#[test]
 fn a_campaign_varies_unless_it_is_told_otherwise_and_shows_success_by_what_varied() {
     let dir = TempDir::new().unwrap();
     scene(dir.path());

@@ -8,6 +8,7 @@ mod scene;
 mod specimens;
 mod study;
 mod task;
+mod view;
 
 pub use episode::*;
 pub use evaluate::*;
@@ -18,6 +19,7 @@ pub use specimens::*;
 pub use study::*;
 pub use task::*;
 pub use trocar_studies::names::{BackName, DesignName, MesherName, SensorName, SolverName, Units};
+pub use view::*;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -80,6 +82,9 @@ pub enum Command {
     /// Write recorded episodes as a dataset of LeRobot or robomimic, rendered now and without
     /// simulation.
     Export(Export),
+    /// Watch a scene, specimen, episode or campaign in the browser while it runs, and take the
+    /// instruments in hand.
+    View(View),
     /// Reproduce a table or figure of the paper, beside the paper's numbers.
     Experiment(Experiment),
     /// Measure speed.

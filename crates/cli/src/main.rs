@@ -6,6 +6,7 @@ mod bar;
 mod cli;
 mod commands;
 mod lines;
+mod open;
 mod output;
 
 use clap::Parser;

@@ -18,12 +18,19 @@ pub struct Recorded(RecordedEpisode);
 #[pymethods]
 impl Recorded {
     /// Opens the episode in `folder`. One without surfaces is replayed and verified. `specimen` is
-    /// the folder of a specimen that was moved.
+    /// the folder of a specimen that was moved. `plain_light`: not that which was drawn.
     #[new]
-    #[pyo3(signature = (folder, *, phantoms, specimen=None))]
-    fn new(py: Python<'_>, folder: PathBuf, phantoms: PathBuf, specimen: Option<PathBuf>) -> PyResult<Self> {
+    #[pyo3(signature = (folder, *, phantoms, specimen=None, plain_light=false))]
+    fn new(
+        py: Python<'_>,
+        folder: PathBuf,
+        phantoms: PathBuf,
+        specimen: Option<PathBuf>,
+        plain_light: bool,
+    ) -> PyResult<Self> {
         let open = || RecordedEpisode::open(&folder, specimen.as_deref(), &phantoms, &Signals::new());
-        py.detach(open).map(Self).map_err(|e| evaluate(&e))
+        let made = py.detach(open).map_err(|e| evaluate(&e))?;
+        Ok(Self(if plain_light { made.in_plain_light() } else { made }))
     }
 
     /// What is known of the recording: a JSON object.

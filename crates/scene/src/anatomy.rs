@@ -24,6 +24,10 @@ pub struct SpecimenSource {
     /// Seed of the phantom's anatomy.
     #[serde(default = "first_seed")]
     pub seed: u32,
+    /// Approximate largest number of elements of each organ of a phantom; the reconstruction's
+    /// default, 50,000, if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_elements: Option<u32>,
     /// Organs of other specimens in the place of its own: by the organ's name, a specimen folder or
     /// a phantom with its seed, as phantom-a:7.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -44,18 +48,30 @@ pub enum Source<'a> {
 }
 
 impl SpecimenSource {
+    /// Range of [`max_elements`](Self::max_elements).
+    pub const MAX_ELEMENTS: std::ops::RangeInclusive<u32> = 1000..=1_000_000;
+
     /// A phantom.
     pub fn phantom(name: &str, seed: u32) -> Self {
-        Self { path: None, phantom: Some(name.to_owned()), seed, swapped: BTreeMap::new() }
+        Self { path: None, phantom: Some(name.to_owned()), seed, max_elements: None, swapped: BTreeMap::new() }
     }
 
     /// A specimen folder.
     pub fn folder(path: &str) -> Self {
-        Self { path: Some(path.to_owned()), phantom: None, seed: first_seed(), swapped: BTreeMap::new() }
+        let swapped = BTreeMap::new();
+        Self { path: Some(path.to_owned()), phantom: None, seed: first_seed(), max_elements: None, swapped }
+    }
+
+    /// The same with at most so many elements an organ.
+    #[must_use]
+    pub fn with_max_elements(self, max_elements: Option<u32>) -> Self {
+        Self { max_elements, ..self }
     }
 
     /// What it is called in results: a folder's path, or a phantom with its seed, as
-    /// `phantom-a:1`; then the organs of others, as `phantom-a:1 with appendix of phantom-a:7`.
+    /// `phantom-a:1`, and with its largest number of elements where that is not the default, as
+    /// `phantom-c:1:14000`; then the organs of others, as `phantom-a:1 with appendix of
+    /// phantom-a:7`.
     pub fn label(&self) -> String {
         let organs: Vec<String> = self.organs_of_others().map(|(organ, other)| format!("{organ} of {other}")).collect();
         match organs.as_slice() {
@@ -68,7 +84,10 @@ impl SpecimenSource {
     pub fn own_label(&self) -> String {
         match self.source() {
             Some(Source::Folder(path)) => path.to_owned(),
-            Some(Source::Phantom(name, seed)) => format!("{name}:{seed}"),
+            Some(Source::Phantom(name, seed)) => {
+                let elements = self.max_elements.map_or_else(String::new, |most| format!(":{most}"));
+                format!("{name}:{seed}{elements}")
+            }
             None => String::new(),
         }
     }
@@ -88,8 +107,16 @@ impl SpecimenSource {
 
     /// What [`own_label`](Self::own_label) calls so.
     pub fn labelled(label: &str) -> Self {
-        let parts = label.rsplit_once(':').and_then(|(name, seed)| Some((Phantom::named(name)?, seed.parse().ok()?)));
-        parts.map_or_else(|| Self::folder(label), |(phantom, seed)| Self::phantom(phantom.name, seed))
+        let parts: Vec<&str> = label.split(':').collect();
+        let phantom = |name: &str, seed: &str| Some(Self::phantom(Phantom::named(name)?.name, seed.parse().ok()?));
+        let found = match parts[..] {
+            [name, seed] => phantom(name, seed),
+            [name, seed, most] => {
+                most.parse().ok().and_then(|most| Some(phantom(name, seed)?.with_max_elements(Some(most))))
+            }
+            _ => None,
+        };
+        found.unwrap_or_else(|| Self::folder(label))
     }
 
     /// What it names; the folder where both are given, `None` where neither is. A checked scene has

@@ -12,7 +12,7 @@ pub struct Builtin {
 }
 
 /// The built-in scenes.
-pub const BUILTINS: [Builtin; 6] = [
+pub const BUILTINS: [Builtin; 8] = [
     Builtin {
         name: "cell-a",
         summary: "the paper's two-arm cell around phantom A: grasper left, cutter right, resection of the appendix",
@@ -42,6 +42,16 @@ pub const BUILTINS: [Builtin; 6] = [
         name: "cell-b-resection",
         summary: "the same cell: resection of that appendix",
         text: include_str!("../scenes/cell-b-resection.toml"),
+    },
+    Builtin {
+        name: "cell-c",
+        summary: "the cell around phantom C, a pig's liver: the grasper lifts the gallbladder by its fundus",
+        text: include_str!("../scenes/cell-c.toml"),
+    },
+    Builtin {
+        name: "cell-c-resection",
+        summary: "the same cell: the gallbladder lifted and cut between grasp and neck",
+        text: include_str!("../scenes/cell-c-resection.toml"),
     },
 ];
 

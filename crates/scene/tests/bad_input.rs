@@ -301,6 +301,11 @@ fn names() {
         ),
         Case(
             "phantom = \"phantom-a\" ",
+            "max_elements = 999§\nphantom = \"phantom-a\" ",
+            "specimen.max_elements is 999; it must be in [1000, 1000000]",
+        ),
+        Case(
+            "phantom = \"phantom-a\" ",
             "",
             "@[specimen]@specimen has neither a path nor a phantom; it must have one of them",
         ),
@@ -482,7 +487,7 @@ fn files() {
     );
     assert_eq!(read(&[0xff, 0xfe]), "/scene.toml: stream did not contain valid UTF-8");
     assert_eq!(read(b""), "/scene.toml: line 1: missing field `name`");
-    let unknown = "no scene 'cell-d'; it must be a TOML file or one of the built-in scenes cell-a, cell-a-retraction, cell-a-stretch, cell-a-bowel, cell-b, cell-b-resection; \
+    let unknown = "no scene 'cell-d'; it must be a TOML file or one of the built-in scenes cell-a, cell-a-retraction, cell-a-stretch, cell-a-bowel, cell-b, cell-b-resection, cell-c, cell-c-resection; \
                    did you mean 'cell-a'?";
     assert_eq!(Scene::read("cell-d").unwrap_err().to_string(), unknown);
     let absent = Scene::read("absent/scene.toml").unwrap_err().to_string();

@@ -83,10 +83,7 @@ fn the_hash_knows_what_counts() {
     let mut other = scene.clone();
     other.ports[0].hole_diameter_mm += 1e-9;
     assert_ne!(other.hash(&[1]).unwrap(), hash);
-    let at = |path: &str| {
-        let specimen = SpecimenSource::folder(path);
-        Scene { specimen, ..scene.clone() }.hash(&[1]).unwrap()
-    };
+    let at = |path: &str| Scene { specimen: SpecimenSource::folder(path), ..scene.clone() }.hash(&[1]).unwrap();
     assert_eq!(at("a"), at("b/c"));
     assert_ne!(at("a"), hash);
 }

@@ -82,7 +82,8 @@ fn what_is_drawn_comes_back_from_its_table() {
     assert_eq!(again, drawn);
     let json = serde_json::to_string(&drawn).unwrap();
     assert_eq!(serde_json::from_str::<Drawn>(&json).unwrap(), drawn);
-    for source in [SpecimenSource::phantom("phantom-b", 9), SpecimenSource::folder("../a:b/c")] {
+    let coarse = SpecimenSource::phantom("phantom-c", 2).with_max_elements(Some(14_000));
+    for source in [SpecimenSource::phantom("phantom-b", 9), SpecimenSource::folder("../a:b/c"), coarse] {
         assert_eq!(SpecimenSource::labelled(&source.label()), source);
     }
     assert!(serde_json::from_str::<Drawn>(r#"{"specimen": "phantom-a:1", "modulus_mpa": 1.0}"#).is_err());

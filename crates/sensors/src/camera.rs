@@ -169,6 +169,12 @@ impl RigCamera {
     }
 }
 
+/// Diameter of the circular image of a camera over the image's height; `None` for a camera whose
+/// image is not circular.
+pub fn image_circle(camera: &CellCamera) -> Option<f64> {
+    is_endoscope(camera).then_some(f64::from(IMAGE_CIRCLE))
+}
+
 /// Whether a camera is an endoscope: it has an oblique view, or the name `endoscope`.
 pub(crate) fn is_endoscope(camera: &CellCamera) -> bool {
     camera.oblique_deg != 0.0 || camera.name == "endoscope"

@@ -1,19 +1,19 @@
 //! The stage of a cell: organs, their surroundings, arms and instruments, updated from the cell.
 
-use crate::camera::is_endoscope;
-use crate::field::{Field, Recorded};
 use crate::instrument::Shapes;
+use crate::looks::{glossed, housing, polished, shell, wet};
 use crate::section::section;
 use crate::skins::{ArmPosture, Skins};
-use crate::{Result, arm, furniture};
+use crate::surroundings::surroundings;
+use crate::{Result, arm};
 use glam::DVec3;
 use std::path::PathBuf;
 use std::sync::Arc;
 use trocar_cell::Cell;
 use trocar_core::Pose;
 use trocar_geometry::TriMesh;
-use trocar_render::{Appearance, BodyId, ShapeId, Stage, SurfaceKind};
-use trocar_scene::{Imaging, InstrumentKind, Scene};
+use trocar_render::{Appearance, BodyId, ShapeId, Stage};
+use trocar_scene::{Imaging, Scene};
 use trocar_specimen::Specimen;
 
 /// First labels of instruments, arms, and other objects. Labels of organs start at 1.
@@ -86,21 +86,7 @@ impl CellStage {
             all.labels.push((label, organ.name.clone()));
             all.organs.push(OrganOnStage { label, shape: None });
         }
-        let surfaces: Vec<&TriMesh> = placed.organs.iter().map(|o| &o.surface).collect();
-        let recorded = match (&placed.background, &placed.camera) {
-            (Some(picture), Some(camera)) => Some(Recorded { picture, camera, pose: recording }),
-            _ => None,
-        };
-        let field = Field::under(&surfaces, recorded.as_ref())?;
-        all.add("field", &field.mesh, &wet(0.36))?;
-        let ports = scene.map_or(&[][..], |s| &s.ports);
-        let mut pieces = furniture::room(&field, ports);
-        for (scene, camera) in scene.iter().flat_map(|s| s.cameras.iter().map(move |c| (s, c))) {
-            if is_endoscope(camera) {
-                pieces.extend(furniture::scope(&camera.shaft(&scene.placement), furniture::table(&field)));
-            }
-        }
-        for piece in pieces {
+        for piece in surroundings(placed, recording, scene)? {
             all.add(piece.name, &piece.mesh, &piece.appearance)?;
         }
         Ok(all)
@@ -132,10 +118,6 @@ impl CellStage {
         let (name, poses) = (arm.name.name(), &posture.links);
         let label = ARMS + k as u16;
         self.labels.push((label, format!("{name} arm")));
-        let shell = Appearance {
-            color: [232; 3],
-            surface: SurfaceKind::Coated { roughness: 0.42, ior: 1.48, scattering_length: [0.0; 3] },
-        };
         // Arms with the same description share their shapes.
         let drawn = arm.drawn().map(|file| ShapeSource {
             file: scene.resolve(file),
@@ -154,20 +136,18 @@ impl CellStage {
         };
         let mut links = Vec::new();
         for (shape, pose) in shapes.iter().zip(poses) {
-            links.push(self.base.add_body(*shape, pose, label, &shell)?);
+            links.push(self.base.add_body(*shape, pose, label, &shell())?);
         }
         let held_shapes = Shapes::of(held);
         let label = INSTRUMENTS + k as u16;
         self.labels.push((label, held.name.clone()));
-        let polished = Appearance { surface: SurfaceKind::Metal { roughness: 0.3 }, ..Appearance::steel() };
-        let dark = Appearance { color: [58, 61, 66], ..shell };
         let mut body = |mesh: &TriMesh, appearance: &Appearance| -> Result<BodyId> {
             let shape = self.base.add_shape(mesh)?;
             Ok(self.base.add_body(shape, &Pose::IDENTITY, label, appearance)?)
         };
-        let shaft = body(&held_shapes.shaft, &polished)?;
-        let motor = body(&held_shapes.motor, if held.kind == InstrumentKind::Grasper { &dark } else { &shell })?;
-        let blades = [body(&held_shapes.blades[0], &polished)?, body(&held_shapes.blades[1], &polished)?];
+        let shaft = body(&held_shapes.shaft, &polished())?;
+        let motor = body(&held_shapes.motor, &housing(held.kind))?;
+        let blades = [body(&held_shapes.blades[0], &polished())?, body(&held_shapes.blades[1], &polished())?];
         self.arms.push(Arm { name, drawn, shapes, links, shaft, motor, blades });
         Ok(())
     }
@@ -258,37 +238,11 @@ impl CellStage {
     }
 }
 
-/// Wet tissue with the given roughness of its film of water.
-fn wet(roughness: f32) -> Appearance {
-    let tissue = Appearance::tissue([190, 96, 88]);
-    match tissue.surface {
-        SurfaceKind::Coated { ior, scattering_length, .. } => {
-            Appearance { surface: SurfaceKind::Coated { roughness, ior, scattering_length }, ..tissue }
-        }
-        _ => tissue,
-    }
-}
-
 /// Scales the colour channels of a surface. Factors of 1 keep every bit.
 fn tint(mesh: &mut TriMesh, factors: [f64; 3]) {
     for color in &mut mesh.colors {
         for (channel, factor) in color.iter_mut().zip(factors) {
             *channel = (f64::from(*channel) * factor).round().clamp(0.0, 255.0) as u8;
         }
-    }
-}
-
-/// The appearance with its highlights scaled by `gloss`: the coat's refractive index for which the
-/// reflectance at normal incidence, ((n - 1) / (n + 1))^2, is scaled so. A factor of 1 keeps every
-/// bit.
-fn glossed(appearance: Appearance, gloss: f64) -> Appearance {
-    match appearance.surface {
-        SurfaceKind::Coated { roughness, ior, scattering_length } if gloss != 1.0 => {
-            let n = f64::from(ior);
-            let root = ((n - 1.0) / (n + 1.0) * gloss.sqrt()).min(0.5);
-            let ior = ((1.0 + root) / (1.0 - root)) as f32;
-            Appearance { surface: SurfaceKind::Coated { roughness, ior, scattering_length }, ..appearance }
-        }
-        _ => appearance,
     }
 }

@@ -9,19 +9,24 @@
 mod arm;
 mod camera;
 mod cell_stage;
+mod drawn;
 mod error;
 mod field;
 mod furniture;
 mod instrument;
+mod looks;
 mod organ;
 mod rig;
 mod section;
 mod skins;
 mod solid;
+mod surroundings;
 mod visuals;
 
-pub use camera::OUTSIDE;
+pub use camera::{OUTSIDE, image_circle};
+pub use drawn::{DrawnBody, DrawnCell, DrawnMesh, DrawnPart};
 pub use error::{Error, Result};
+pub use organ::BoundSurface;
 pub use rig::{CameraRig, PICTURE_SIDES, SensorNoise};
 pub use skins::{ArmPosture, SkinnedOrgan, Skins};
 pub use trocar_camera::DepthNoise;

@@ -26,7 +26,7 @@ pub(crate) struct OrganSkin {
 /// A surface whose vertices are weighted sums of nodes. Nodes of all pieces are numbered
 /// consecutively.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct BoundSurface {
+pub struct BoundSurface {
     /// Rest pose, with colours.
     pub mesh: TriMesh,
     weights: Vec<([u32; 4], [f64; 4])>,
@@ -164,6 +164,15 @@ impl BoundSurface {
             });
         }
         self.mesh.triangles.extend(faces.iter().map(|f| f.map(|node| number[&node])));
+    }
+
+    /// Values at the vertices for the values `nodes` at the nodes.
+    pub fn values(&self, nodes: &[f32], out: &mut Vec<f32>) {
+        out.clear();
+        out.extend(self.weights.iter().map(|(tet, w)| {
+            let [a, b, c, d] = tet.map(|i| nodes[i as usize]);
+            w[0] as f32 * a + w[1] as f32 * b + w[2] as f32 * c + w[3] as f32 * d
+        }));
     }
 
     /// Vertex positions for the node positions `nodes` (m). Reuses the memory of `out`.

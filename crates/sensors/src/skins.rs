@@ -70,6 +70,21 @@ impl SkinnedOrgan {
         &self.positions
     }
 
+    /// Triangles and colours, and how its vertices follow the nodes.
+    pub fn surface(&self) -> &Arc<BoundSurface> {
+        &self.surface
+    }
+
+    /// Nodes of all its pieces now (m), numbered consecutively.
+    pub fn nodes(&self) -> &[DVec3] {
+        &self.nodes
+    }
+
+    /// Bodies of the cell that are its pieces, in the order of the nodes.
+    pub fn bodies(&self) -> &[usize] {
+        &self.bodies
+    }
+
     /// Whether the last update moved it.
     pub fn moved(&self) -> bool {
         self.moved

@@ -187,7 +187,7 @@ impl AppendixChoice {
             return Ok((Specimen::read(folder)?, folder.clone()));
         }
         let folder = output.join("phantom-a");
-        let specimen = phantoms::specimen("phantom-a", &self.recorded.options(), &folder, progress)?;
+        let specimen = phantoms::specimen("phantom-a", &self.recorded.options(), None, &folder, progress)?;
         Ok((specimen, folder.join("specimen")))
     }
 }

@@ -1,6 +1,8 @@
 //! The list of all studies.
 
-use crate::bench::{CellBench, EpisodeBench, GraspBench, MeshingBench, OrgansBench, RenderBench, ScalingBench};
+use crate::bench::{
+    CellBench, EpisodeBench, GraspBench, MeshingBench, OrgansBench, RenderBench, ScalingBench, ViewBench,
+};
 use crate::experiment::{
     ControllerGridExperiment, ConvergenceExperiment, ElementQualityExperiment, GraspDesignsExperiment,
     IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment, ReconstructionExperiment,
@@ -30,4 +32,5 @@ pub static STUDIES: &[&dyn Entry] = &[
     &Of::<CellBench>::NEW,
     &Of::<EpisodeBench>::NEW,
     &Of::<RenderBench>::NEW,
+    &Of::<ViewBench>::NEW,
 ];

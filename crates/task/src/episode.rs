@@ -217,10 +217,19 @@ impl Episode {
     /// An action that cannot be done: nothing has changed, and the caller may try another or
     /// [`fail`](Self::fail). An episode that has ended.
     pub fn step(&mut self, action: &Action) -> Result<Step> {
+        self.step_watched(action, &mut |_| {})
+    }
+
+    /// The same with a `watch` that sees the cell after each tissue frame. What it does must not
+    /// change the steps that follow.
+    ///
+    /// # Errors
+    /// As [`step`](Self::step).
+    pub fn step_watched(&mut self, action: &Action, watch: &mut dyn FnMut(&mut Cell)) -> Result<Step> {
         if let Some(end) = &self.now.end {
             return Err(Error::Ended(end.to_string()));
         }
-        let report = match self.cell.step(action) {
+        let report = match self.cell.step_watched(action, watch) {
             Ok(report) => report,
             Err(refused @ trocar_cell::Error::Action { .. }) => return Err(refused.into()),
             // An arm whose numbers are lost: the last row that was right again, but for the time,

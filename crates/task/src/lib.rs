@@ -38,7 +38,7 @@ pub use observation::{ArmState, Observation, STATE_NAMES, STATE_SIZE, privileged
 pub use policy::Policy;
 pub use prompt::prompt;
 pub use replay::{EpisodeFile, Header, Verdict, scene_hash};
-pub use run::{CHANNELS_FILE, EPISODE_FILE, EpisodeResult, RESULT_FILE, Recording, TimedEvent, run, run_watched};
+pub use run::{CHANNELS_FILE, EPISODE_FILE, EpisodeResult, Kept, RESULT_FILE, Recording, TimedEvent, run, run_watched};
 pub use specimen::specimen_hash;
 pub use stages::{Progress, StageProgress, Tracker};
 pub use storage::{ChannelsInfo, read_channels, write_channels};

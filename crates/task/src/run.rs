@@ -5,7 +5,7 @@ use crate::storage::{ChannelsInfo, write_channels};
 use crate::{Channels, Episode, Error, Policy, Result, Step, Summary};
 use serde::Serialize;
 use std::path::Path;
-use trocar_cell::CellEvent;
+use trocar_cell::{Action, CellEvent};
 
 /// Names of the files in an episode's folder.
 pub const EPISODE_FILE: &str = "episode.trocar";
@@ -27,6 +27,65 @@ pub struct Recording {
     pub events: Vec<(f64, CellEvent)>,
     /// The figures.
     pub summary: Summary,
+}
+
+/// The actions of an episode while it runs, each with the state's hash after it.
+#[derive(Clone, Debug)]
+pub struct Kept {
+    header: Header,
+    steps: Vec<(Action, u64)>,
+}
+
+impl Kept {
+    /// Of `episode`, which stands at its start, by the policy of that name.
+    ///
+    /// # Errors
+    /// A model file that cannot be read.
+    pub fn begin(episode: &Episode, policy: &str) -> Result<Self> {
+        Ok(Self { header: Header::of(episode, policy)?, steps: Vec::new() })
+    }
+
+    /// Adds an action that was done, with the hash of the state after it.
+    pub fn add(&mut self, action: Action, hash: u64) {
+        self.steps.push((action, hash));
+    }
+
+    /// The actions so far.
+    pub fn steps(&self) -> &[(Action, u64)] {
+        &self.steps
+    }
+
+    /// Names the policy anew: who acts may change on the way.
+    pub fn rename(&mut self, policy: &str) {
+        policy.clone_into(&mut self.header.policy);
+    }
+
+    /// The recording, with `episode` after the last action.
+    ///
+    /// # Errors
+    /// A task that cannot be written out.
+    pub fn finish(mut self, episode: &Episode) -> Result<Recording> {
+        self.header.end = episode.end().cloned();
+        let scene = episode.scene();
+        let info = ChannelsInfo {
+            scene: scene.name.clone(),
+            task: scene.task.name,
+            gates: scene.task.gates,
+            context: Some(scene.task_context()?),
+            rcm_threshold_mm: scene.safety.rcm_threshold_mm,
+            rcm_abort_mm: Some(scene.safety.rcm_abort_mm),
+            arms: episode.cell().arms().iter().map(|(side, _)| side.name().to_owned()).collect(),
+            policy: self.header.policy.clone(),
+            seed: episode.seed(),
+        };
+        Ok(Recording {
+            file: EpisodeFile { header: self.header, steps: self.steps },
+            info,
+            channels: episode.rows().to_vec(),
+            events: episode.events().to_vec(),
+            summary: episode.summary(),
+        })
+    }
 }
 
 /// What stands in `result.json`.
@@ -85,8 +144,7 @@ pub fn run_watched(
     watch: &mut dyn FnMut(&Episode, Option<&Step>) -> bool,
 ) -> Result<Recording> {
     episode.reset(seed)?;
-    let mut header = Header::of(episode, policy.name())?;
-    let mut steps = Vec::new();
+    let mut kept = Kept::begin(episode, policy.name())?;
     policy.begin(episode, seed)?;
     if !watch(episode, None) {
         return Err(trocar_cell::Error::Interrupted.into());
@@ -110,7 +168,7 @@ pub fn run_watched(
         for action in chunk {
             match episode.step(&action) {
                 Ok(step) => {
-                    steps.push((action, episode.state_hash()));
+                    kept.add(action, episode.state_hash());
                     if !watch(episode, Some(&step)) {
                         return Err(trocar_cell::Error::Interrupted.into());
                     }
@@ -126,26 +184,7 @@ pub fn run_watched(
             }
         }
     }
-    header.end = episode.end().cloned();
-    let scene = episode.scene();
-    let info = ChannelsInfo {
-        scene: scene.name.clone(),
-        task: scene.task.name,
-        gates: scene.task.gates,
-        context: Some(scene.task_context()?),
-        rcm_threshold_mm: scene.safety.rcm_threshold_mm,
-        rcm_abort_mm: Some(scene.safety.rcm_abort_mm),
-        arms: episode.cell().arms().iter().map(|(side, _)| side.name().to_owned()).collect(),
-        policy: policy.name().to_owned(),
-        seed,
-    };
-    Ok(Recording {
-        file: EpisodeFile { header, steps },
-        info,
-        channels: episode.rows().to_vec(),
-        events: episode.events().to_vec(),
-        summary: episode.summary(),
-    })
+    kept.finish(episode)
 }
 
 impl Recording {

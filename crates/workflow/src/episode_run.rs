@@ -1,7 +1,7 @@
 //! `trocar episode`, `trocar replay` and `trocar sweep`.
 
 use crate::pages;
-use crate::phantoms::scene_specimen;
+use crate::phantoms::recorded_specimen;
 use crate::reconstruct::{REPORT, refuse_overlap};
 use crate::recorder::Recorder;
 use crate::specimen_cache::{SpecimenCache, drawn_specimens};
@@ -13,7 +13,7 @@ use std::time::Instant;
 use trocar_core::Progress;
 use trocar_scene::{Scene, VariationSet};
 use trocar_sensors::CameraRig;
-use trocar_specimen::{Specimen, StagedFolder};
+use trocar_specimen::StagedFolder;
 use trocar_task::{
     CHANNELS_FILE, EPISODE_FILE, Episode, EpisodeFile, EpisodeResult, GateRange, Policy, RESULT_FILE, Sweep, Verdict,
     policy, read_channels, run_watched, sweep,
@@ -176,10 +176,7 @@ pub fn replay(
 ) -> Result<Verdict> {
     let episode = read_episode(file)?;
     let scene = episode.scene(specimen)?;
-    let specimen = match specimen {
-        Some(folder) => Specimen::read(folder)?,
-        None => scene_specimen(&scene, phantoms, progress)?,
-    };
+    let specimen = recorded_specimen(&scene, specimen, phantoms, progress)?;
     progress.begin("replay", episode.steps.len() as u64);
     let verdict = episode.verify(&scene, &specimen, threads, &mut || {
         progress.advance(1);

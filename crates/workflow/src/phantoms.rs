@@ -1,6 +1,7 @@
 //! Phantoms as specimens: recorded, unless an earlier run left the recording, and reconstructed.
 
 use crate::reconstruct::reconstruct_recording;
+use crate::specimen_scene::source;
 use crate::{Error, Result};
 use std::fs::File;
 use std::io::ErrorKind;
@@ -31,18 +32,32 @@ pub fn recorded(phantom: &str, options: &RecordOptions, dir: &Path, progress: &d
 }
 
 /// The file with the program and options that made a kept specimen; it is reused only for the same.
-const STAMP: &str = "made-by.txt";
+const STAMP: &str = "made-by";
+
+/// The folder of a specimen beside its phantom's recording, and its stamp.
+fn specimen_and_stamp(folder: &Path, max_elements: Option<u32>) -> (PathBuf, PathBuf) {
+    let ending = max_elements.map_or_else(String::new, |most| format!("-{most}"));
+    (folder.join(format!("specimen{ending}")), folder.join(format!("{STAMP}{ending}.txt")))
+}
 
 /// `phantom`, recorded into `folder/recording` and reconstructed with the default settings into
-/// `folder/specimen`. A specimen of an earlier run is reused if the same program would make the
+/// `folder/specimen`, or with about `max_elements` an organ at most into `folder/specimen-NUMBER`.
+/// A specimen of an earlier run is reused if the same program would make the
 /// same. Of several processes that need it at once, one makes it and the others wait.
 ///
 /// # Errors
 /// A phantom that is not known, a folder that cannot be written.
-pub fn specimen(phantom: &str, options: &RecordOptions, folder: &Path, progress: &dyn Progress) -> Result<Specimen> {
-    let (settings, [recording, specimen]) = (Settings::default(), ["recording", "specimen"].map(|n| folder.join(n)));
+pub fn specimen(
+    phantom: &str,
+    options: &RecordOptions,
+    max_elements: Option<u32>,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<Specimen> {
+    let mut settings = Settings::default();
+    settings.max_tets = max_elements.map_or(settings.max_tets, |most| most as usize);
+    let (recording, (specimen, path)) = (folder.join("recording"), specimen_and_stamp(folder, max_elements));
     let stamp = format!("{phantom}\n{options:?}\n{settings:?}\n{}\n", env!("TROCAR_SPECIMEN_SOURCE_HASH"));
-    let path = folder.join(STAMP);
     let io = |source| Error::Io { path: path.clone(), source };
     std::fs::create_dir_all(folder).map_err(io)?;
     let lock = File::create(folder.join(".lock")).map_err(io)?;
@@ -73,6 +88,22 @@ pub fn scene_specimen(scene: &Scene, phantoms: &Path, progress: &dyn Progress) -
     source_specimen(&scene.specimen, &scene.folder, phantoms, progress)
 }
 
+/// The specimen of the scene of a recorded episode: the scene's, or the one in `folder`, which was
+/// moved, with the same organs of others.
+///
+/// # Errors
+/// As [`scene_specimen`].
+pub(crate) fn recorded_specimen(
+    scene: &Scene,
+    folder: Option<&Path>,
+    phantoms: &Path,
+    progress: &dyn Progress,
+) -> Result<Specimen> {
+    let Some(folder) = folder else { return scene_specimen(scene, phantoms, progress) };
+    let source = SpecimenSource { swapped: scene.specimen.swapped.clone(), ..source(folder) };
+    source_specimen(&source, &scene.folder, phantoms, progress)
+}
+
 fn kept_in(phantoms: &Path, name: &str, seed: u32) -> PathBuf {
     phantoms.join(format!("{name}-{seed}"))
 }
@@ -81,7 +112,9 @@ fn kept_in(phantoms: &Path, name: &str, seed: u32) -> PathBuf {
 /// or a phantom that some program has made in the folder `phantoms`.
 pub fn is_made(source: &SpecimenSource, phantoms: &Path) -> bool {
     let own = match source.source() {
-        Some(Source::Phantom(name, seed)) => kept_in(phantoms, name, seed).join(STAMP).is_file(),
+        Some(Source::Phantom(name, seed)) => {
+            specimen_and_stamp(&kept_in(phantoms, name, seed), source.max_elements).1.is_file()
+        }
         Some(Source::Folder(_)) | None => true,
     };
     own && source.organs_of_others().all(|(_, other)| is_made(&SpecimenSource::labelled(other), phantoms))
@@ -103,7 +136,7 @@ pub fn source_specimen(
         Some(Source::Folder(path)) => Specimen::read(&folder.join(path))?,
         Some(Source::Phantom(name, seed)) => {
             let options = RecordOptions { frames: FRAMES, seed: u64::from(seed), ..RecordOptions::default() };
-            specimen(name, &options, &kept_in(phantoms, name, seed), progress)?
+            specimen(name, &options, source.max_elements, &kept_in(phantoms, name, seed), progress)?
         }
         None => return Err(Error::Mismatch("the scene names neither a specimen folder nor a phantom".to_owned())),
     };

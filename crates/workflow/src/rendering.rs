@@ -9,7 +9,7 @@ pub use rendered::{Rendered, VisibleObject};
 pub use script::ScriptedLift;
 
 use crate::episode_replay::EpisodeReplay;
-use crate::phantoms::scene_specimen;
+use crate::phantoms::{recorded_specimen, scene_specimen};
 use crate::picture_colors::{averaged, label_color, shown};
 use crate::video::VideoWriter;
 use crate::{Error, Result, check_interrupted};
@@ -137,10 +137,7 @@ impl Rendering {
         let recorded = EpisodeFile::read(file)?;
         let scene = recorded.scene(self.specimen.as_deref())?;
         self.check_camera(&scene)?;
-        let specimen = match &self.specimen {
-            Some(folder) => Specimen::read(folder)?,
-            None => scene_specimen(&scene, &self.phantoms, progress)?,
-        };
+        let specimen = recorded_specimen(&scene, self.specimen.as_deref(), &self.phantoms, progress)?;
         if let Some(other) = recorded.other(&scene, &specimen)? {
             let right = "name the folder of the recorded specimen by --specimen";
             return Err(Error::Mismatch(format!("{}: {other}; {right}", file.display())));

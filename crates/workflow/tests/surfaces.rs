@@ -7,12 +7,12 @@
 use std::path::Path;
 use trocar_core::Silent;
 use trocar_render::RenderSettings;
-use trocar_scene::SpecimenSource;
+use trocar_scene::{Distribution, Factor, SpecimenSource};
 use trocar_sensors::{ArmPosture, CameraRig, Skins};
 use trocar_specimen::Specimen;
 use trocar_task::{EPISODE_FILE, Episode, policy, run_watched};
 use trocar_testing::tube::{ONE_END, resection, two_tubes};
-use trocar_workflow::{RecordedEpisode, SURFACES_FILE, SurfaceWatch};
+use trocar_workflow::{RecordedEpisode, SURFACES_FILE, SurfaceWatch, write_gltf};
 
 const SETTINGS: RenderSettings = RenderSettings::Preview { shadows: false };
 const SIZE: [usize; 2] = [64, 48];
@@ -33,6 +33,7 @@ fn recorded(folder: &Path) -> (Seen, Vec<u8>) {
     let mut scene = resection();
     scene.specimen = SpecimenSource::folder("tube");
     scene.task.sever = true;
+    scene.variation.factors.insert(Factor::LampScale, Distribution::Uniform([0.4, 0.5]));
     scene.folder = folder.to_owned();
     scene.cameras.retain(|c| c.name == "endoscope");
     scene.validate().unwrap();
@@ -61,6 +62,78 @@ fn recorded(folder: &Path) -> (Seen, Vec<u8>) {
 
 fn open(folder: &Path) -> trocar_workflow::Result<RecordedEpisode> {
     RecordedEpisode::open(folder, None, &folder.join("phantoms"), &Silent)
+}
+
+/// The episode as glTF, opened by the reader of the `gltf` crate: shapes, poses and times are those
+/// that were seen, and the organ that is cut has a mesh before and one after.
+fn check_gltf(folder: &Path, seen: &Seen) {
+    let path = folder.join("episode.glb");
+    let refused = write_gltf(&mut open(folder).unwrap(), &path, 65, &Silent).unwrap_err().to_string();
+    assert!(refused.contains("from 2 to 64"), "{refused}");
+    let written = write_gltf(&mut open(folder).unwrap(), &path, 12, &Silent).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    assert_eq!((written.keyframes, written.bytes), (12, bytes.len()));
+    let read = gltf::Gltf::from_slice(&bytes).unwrap();
+    let buffer = read.blob.as_deref().unwrap();
+    let data = |_: gltf::Buffer<'_>| Some(buffer);
+    let named = |name: &str| read.nodes().filter(|n| n.name() == Some(name)).collect::<Vec<_>>();
+    // The second tube is cut: it has two meshes, one of which is shown at a time.
+    let organs: Vec<_> = ["tube", "low"].iter().flat_map(|name| named(name)).collect();
+    let last = seen.positions.len() - 1;
+    let frames: Vec<usize> = (0..12).map(|k| k * last / 11).collect();
+    let near = |a: [f32; 3], b: glam::DVec3| glam::Vec3::from(a).as_dvec3().distance(b) < 2e-5;
+    let (mut shapes, mut hidden) = (0, 0);
+    for node in &organs {
+        let primitive = node.mesh().unwrap().primitives().next().unwrap();
+        let start: Vec<[f32; 3]> = primitive.reader(data).read_positions().unwrap().collect();
+        assert!(primitive.reader(data).read_colors(0).is_some() && primitive.reader(data).read_normals().is_some());
+        let targets: Vec<Vec<[f32; 3]>> =
+            primitive.reader(data).read_morph_targets().map(|(p, ..)| p.unwrap().collect()).collect();
+        shapes += targets.len();
+        // Every shape is a keyframe of an organ with as many vertices.
+        for target in &targets {
+            let moved: Vec<[f32; 3]> =
+                start.iter().zip(target).map(|(a, b)| std::array::from_fn(|c| a[c] + b[c])).collect();
+            let fits = |live: &Vec<glam::DVec3>| {
+                live.len() == moved.len() && moved.iter().zip(live).all(|(a, b)| near(*a, *b))
+            };
+            assert!(frames.iter().any(|frame| seen.positions[*frame].iter().any(fits)), "{:?}", node.name());
+        }
+    }
+    let animation = read.animations().next().unwrap();
+    for channel in animation.channels() {
+        let reader = channel.reader(data);
+        let times: Vec<f32> = reader.read_inputs().unwrap().collect();
+        assert!(times.len() >= 2 && times.windows(2).all(|w| w[1] > w[0]));
+        assert!((f64::from(*times.last().unwrap()) - last as f64 / 30.0).abs() < 1e-3 || times.len() < 12);
+        match reader.read_outputs().unwrap() {
+            gltf::animation::util::ReadOutputs::Scales(scales) => {
+                let shown: Vec<f32> = scales.map(|s| s[0]).collect();
+                assert!(shown.contains(&0.0) && shown.contains(&1.0), "{shown:?}");
+                hidden += 1;
+            }
+            gltf::animation::util::ReadOutputs::Translations(places) => {
+                assert_eq!(places.count(), 12);
+            }
+            gltf::animation::util::ReadOutputs::Rotations(turns) => assert_eq!(turns.into_f32().count(), 12),
+            gltf::animation::util::ReadOutputs::MorphTargetWeights(weights) => {
+                let weights: Vec<f32> = weights.into_f32().collect();
+                assert_eq!(weights.len(), times.len() * (times.len() - 1));
+                let ones = weights.iter().filter(|w| **w == 1.0).count();
+                assert_eq!(ones, times.len() - 1, "each shape has its moment");
+            }
+        }
+    }
+    assert!(shapes >= 10 && hidden == 2, "{shapes} shapes, {hidden} meshes are hidden at times");
+    // The tip of the left instrument at the end.
+    let gripper = seen.arms[last][0].gripper.pose;
+    let shaft = named("left grasper");
+    let of_shaft: Vec<_> = animation.channels().filter(|c| c.target().node().index() == shaft[0].index()).collect();
+    let place = of_shaft.iter().find_map(|c| match c.reader(data).read_outputs().unwrap() {
+        gltf::animation::util::ReadOutputs::Translations(places) => places.last(),
+        _ => None,
+    });
+    assert!(near(place.unwrap(), gripper.translation), "{place:?} {gripper:?}");
 }
 
 #[test]
@@ -112,6 +185,17 @@ fn surfaces_give_what_was_seen() {
     assert!(meshes >= 2, "the cut changes the meshes");
     assert!(worst > 0.0 && worst < 5e-6, "{worst} m");
     assert!(differ < 0.05, "pictures differ by {differ} of 255");
+
+    check_gltf(folder.path(), &seen);
+
+    // The lamp was drawn; under the scene's own light the same frame is brighter.
+    let sum = |episode: &mut RecordedEpisode| -> u64 {
+        let picture = episode.picture("endoscope", SIZE, &SETTINGS).unwrap();
+        picture.color.pixels.as_flattened().iter().map(|v| u64::from(*v)).sum()
+    };
+    let drawn = sum(&mut open(folder.path()).unwrap());
+    let plain = sum(&mut open(folder.path()).unwrap().in_plain_light());
+    assert!(plain as f64 > 1.2 * drawn as f64, "{plain} {drawn}");
 
     // Without surfaces the episode is replayed, which gives the same file.
     std::fs::remove_file(&path).unwrap();

@@ -46,6 +46,11 @@ impl Cell {
         })
     }
 
+    /// Body and nodes of the tissue that arm `k` holds; `None` if it holds nothing.
+    pub fn carried_nodes(&self, k: usize) -> Option<(usize, &[u32])> {
+        self.arms.get(k)?.state.held.as_ref().map(|held| held.hold.tissue())
+    }
+
     /// Tissue of body `organ` between the blades of arm `k`, and its share of the region between
     /// them; `None` without tissue there.
     pub fn between_blades(&self, k: usize, organ: usize) -> Option<(TissueInJaws, f64)> {

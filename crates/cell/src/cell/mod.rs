@@ -176,6 +176,11 @@ impl Cell {
         1.0 / f64::from(self.control_hz)
     }
 
+    /// Tissue frames a control period.
+    pub fn frames(&self) -> u32 {
+        self.frames
+    }
+
     /// The tissue, in the cell frame: privileged, not for policies.
     pub fn world(&self) -> &World {
         &self.world

@@ -8,10 +8,10 @@ pub struct Export {
     /// Episode folders, campaign folders, or folders of such.
     #[arg(required = true)]
     pub sources: Vec<PathBuf>,
-    /// Dataset to write: a folder for lerobot, an .hdf5 file for robomimic.
+    /// What to write: a folder for lerobot, an .hdf5 file for robomimic, a .glb file for gltf.
     #[arg(short, long)]
     pub output: PathBuf,
-    /// Layout of the dataset.
+    /// Layout of the dataset, or gltf: one episode as an animated scene for other programs.
     #[arg(long, value_enum, default_value_t = Layout::Lerobot)]
     pub format: Layout,
     /// Cameras of the scene; by default all but recording. "none" writes no pictures.
@@ -21,9 +21,15 @@ pub struct Export {
     /// policy_size_px.
     #[arg(long, value_name = "WxH", value_parser = super::size)]
     pub size: Option<[usize; 2]>,
+    /// Moments of a glTF file, from 2 to 64, evenly spaced over the episode.
+    #[arg(long, value_name = "COUNT", default_value_t = trocar_workflow::MAX_KEYFRAMES)]
+    pub keyframes: usize,
     /// Also episodes that did not pass.
     #[arg(long)]
     pub all: bool,
+    /// Light, exposure, gloss and tint of the scene, instead of those drawn for each episode.
+    #[arg(long)]
+    pub plain_light: bool,
     /// Specimen folder, if it was moved from its place in the scene.
     #[arg(long, value_name = "FOLDER")]
     pub specimen: Option<PathBuf>,
@@ -39,4 +45,6 @@ pub enum Layout {
     Lerobot,
     /// robomimic's HDF5 file.
     Robomimic,
+    /// A binary glTF file of one episode.
+    Gltf,
 }

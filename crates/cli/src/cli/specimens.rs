@@ -13,6 +13,9 @@ pub struct Specimens {
     /// Seed of the first anatomy.
     #[arg(long, default_value_t = 1)]
     pub first_seed: u32,
+    /// Approximate largest number of elements of an organ, as `specimen.max_elements` in a scene
+    #[arg(long, value_name = "NUMBER")]
+    pub max_elements: Option<u32>,
     /// Folder of phantoms
     /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
     #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]

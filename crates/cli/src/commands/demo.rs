@@ -2,8 +2,7 @@
 
 use crate::cli;
 use crate::commands::{reconstruct, simulate};
-use crate::output;
-use std::path::Path;
+use crate::{open, output};
 use trocar_core::Progress;
 use trocar_workflow::{Demo, DemoResult, Result};
 
@@ -20,18 +19,7 @@ pub fn run(arguments: &cli::Demo, json: bool, progress: &dyn Progress) -> Result
         )
     });
     if !arguments.no_open && !json && std::env::var_os("CI").is_none() {
-        open(Path::new(&result.lift.report));
+        open::in_browser(&result.lift.report, "the report");
     }
     Ok(())
-}
-
-/// Opens a file in the browser if there is a desktop.
-fn open(path: &Path) {
-    let desktop = cfg!(target_os = "macos")
-        || cfg!(windows)
-        || std::env::var_os("DISPLAY").is_some()
-        || std::env::var_os("WAYLAND_DISPLAY").is_some();
-    if desktop && open::that_detached(path).is_err() {
-        eprintln!("the browser cannot be started; open the report yourself");
-    }
 }

@@ -14,6 +14,7 @@ mod simulate;
 mod specimens;
 mod study;
 mod task;
+mod view;
 
 use crate::cli::{Cli, Command};
 use trocar_core::Progress;
@@ -28,7 +29,7 @@ pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
         Command::Evaluate(arguments) => evaluate::run(arguments, cli.json, progress)?,
         Command::Episode(arguments) => episode::run(arguments, cli.json, progress)?,
         Command::Replay(arguments) => episode::replay_file(arguments, cli.json, progress)?,
-        Command::Export(arguments) => export::run(arguments, cli.json, cli.quiet)?,
+        Command::Export(arguments) => export::run(arguments, cli.json, cli.quiet, progress)?,
         Command::Sweep(arguments) => episode::sweep(arguments, cli.json, progress)?,
         Command::Inspect(arguments) => inspect::run(arguments, cli.json)?,
         Command::Record(arguments) => record::run(arguments, cli.json, progress)?,
@@ -39,6 +40,7 @@ pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
         Command::Task(arguments) => task::run(arguments, cli.json)?,
         Command::Specimens(arguments) => specimens::run(arguments, cli.json, progress)?,
         Command::Segment(arguments) => segment::run(arguments, cli.json, progress)?,
+        Command::View(arguments) => view::run(arguments, cli.json, progress)?,
         Command::Simulate(arguments) => simulate::run(arguments, cli.json, progress)?,
     }
     Ok(())

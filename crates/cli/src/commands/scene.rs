@@ -102,7 +102,8 @@ fn reach_lines(reach: &[ToolReach], organ: &str) -> Vec<String> {
 /// would time out. Prints nothing if the specimen must be made first.
 pub fn note_reach(name: &str) {
     let Ok(scene) = Scene::read(name) else { return };
-    let Some(Source::Folder(path)) = scene.specimen.source().filter(|_| scene.needs_organ()) else { return };
+    let own = |_: &Source<'_>| scene.needs_organ() && scene.specimen.swapped.is_empty();
+    let Some(Source::Folder(path)) = scene.specimen.source().filter(own) else { return };
     let Ok(specimen) = Specimen::read(&scene.resolve(path)) else { return };
     for missed in tool_reach(&scene, &specimen).unwrap_or_default().iter().filter(|r| !r.reaches()) {
         let (arm, organ, mm) = (missed.arm.name(), &scene.task.organ, missed.missed_mm);
@@ -113,7 +114,8 @@ pub fn note_reach(name: &str) {
 fn check(file: &str, json: bool) -> Result<()> {
     let scene = Scene::read(file)?;
     let reach = match scene.specimen.source() {
-        Some(Source::Folder(path)) if scene.needs_organ() => {
+        // Where organs of others come to lie is known when the specimen is made.
+        Some(Source::Folder(path)) if scene.needs_organ() && scene.specimen.swapped.is_empty() => {
             tool_reach(&scene, &Specimen::read(&scene.resolve(path))?)?
         }
         _ => Vec::new(),

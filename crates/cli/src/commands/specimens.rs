@@ -32,9 +32,13 @@ pub fn run(arguments: &Specimens, json: bool, progress: &dyn Progress) -> Result
         return Err(Error::Mismatch(format!("no phantom '{:.60}'; the phantoms are {known}", arguments.phantom)));
     }
     let clock = Instant::now();
-    let all: Vec<SpecimenSource> =
-        (first..=last).map(|seed| SpecimenSource::phantom(&arguments.phantom, seed)).collect();
+    let source = |seed| SpecimenSource::phantom(&arguments.phantom, seed).with_max_elements(arguments.max_elements);
+    let all: Vec<SpecimenSource> = (first..=last).map(source).collect();
     let scene = Scene::new("specimens", all[0].clone());
+    if let Some(most) = arguments.max_elements.filter(|most| !SpecimenSource::MAX_ELEMENTS.contains(most)) {
+        let (low, high) = (SpecimenSource::MAX_ELEMENTS.start(), SpecimenSource::MAX_ELEMENTS.end());
+        return Err(Error::Mismatch(format!("--max-elements {most}: it must be in [{low}, {high}]")));
+    }
     SpecimenCache::new(&scene, &arguments.phantoms).make_all(&all, progress)?;
     let made = Made {
         folder: arguments.phantoms.display().to_string(),

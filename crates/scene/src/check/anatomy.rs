@@ -41,6 +41,15 @@ fn specimen(scene: &Scene) -> Checked {
         }
         _ => {}
     }
+    if let Some(most) = given.max_elements {
+        if given.path.is_some() {
+            let reason = " is for phantoms; the folder of specimen.path has its meshes";
+            return Err(problem("specimen.max_elements", reason.into()));
+        }
+        let range = SpecimenSource::MAX_ELEMENTS;
+        let range = f64::from(*range.start())..=f64::from(*range.end());
+        number("specimen.max_elements", f64::from(most), &range)?;
+    }
     for (organ, other) in &given.swapped {
         let at = format!("specimen.swapped.{organ}");
         match SpecimenSource::labelled(other).source() {

@@ -234,7 +234,8 @@ impl Scene {
             _ => return vec![self.specimen.clone()],
         };
         let [first, last] = drawn.seeds;
-        let phantoms = drawn.phantoms.iter().flat_map(|name| (first..=last).map(|s| SpecimenSource::phantom(name, s)));
+        let made = |name: &str, seed| SpecimenSource::phantom(name, seed).with_max_elements(self.specimen.max_elements);
+        let phantoms = drawn.phantoms.iter().flat_map(|name| (first..=last).map(move |seed| made(name, seed)));
         let paths = drawn.paths.iter().map(|path| SpecimenSource::folder(path));
         let swapped = &self.specimen.swapped;
         phantoms.chain(paths).map(|source| SpecimenSource { swapped: swapped.clone(), ..source }).collect()

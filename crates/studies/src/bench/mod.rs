@@ -12,6 +12,7 @@ mod pytetwild;
 mod render;
 mod scaling;
 mod timing;
+mod view;
 
 pub use cell::CellBench;
 pub use episode::EpisodeBench;
@@ -20,3 +21,4 @@ pub use meshing::MeshingBench;
 pub use organs::OrgansBench;
 pub use render::RenderBench;
 pub use scaling::ScalingBench;
+pub use view::ViewBench;

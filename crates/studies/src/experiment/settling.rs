@@ -111,7 +111,7 @@ impl Study for SettlingExperiment {
         let mut rows = Vec::with_capacity(named.len());
         for phantom in &named {
             let specimen =
-                phantoms::specimen(phantom, &self.recorded.options(), &job.output().join(phantom), job.progress)?;
+                phantoms::specimen(phantom, &self.recorded.options(), None, &job.output().join(phantom), job.progress)?;
             rows.push(released(phantom, World::new(&specimen, schedule, self.threads)?, job.progress)?);
         }
         let result = SettlingResult { phantoms: rows, schedule: self.schedule.name().to_owned() };

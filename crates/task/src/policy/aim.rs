@@ -29,6 +29,11 @@ const WIDE: f64 = 0.0115;
 const DIP: f64 = 0.0035;
 const PINCH: f64 = 0.7;
 
+/// Tissue wider than this (m) is so flat between the blades that they have to gather a fold of it:
+/// they go deeper by this share of the excess, and open in proportion to the width.
+const FLAT: f64 = 0.020;
+const DEEPER: f64 = 0.5;
+
 /// Length of the blades (m).
 const BLADES: f64 = 0.021;
 
@@ -41,6 +46,8 @@ pub(super) struct Aim {
     pub missed: f64,
     /// Organ coordinate.
     pub s: f64,
+    /// Whether the blades gather a fold of tissue that is much wider than they open.
+    pub folds: bool,
 }
 
 /// The nodes of the organ at organ coordinate `s`.
@@ -153,9 +160,14 @@ pub(super) fn grasp(cell: &Cell, arm: &str, body: usize, (place, manner): (Place
     let x = cell.workspace(arm)?.direction_to(point);
     let (width, height) = width_and_height(cell, body, cluster.s, x, point);
     let fits = width <= WIDE && manner == Manner::Fitting;
-    let (depth, jaw) = if fits { (DEPTH, 1.0) } else { (height + BLADES - DIP, PINCH) };
+    let folds = width > FLAT;
+    let (depth, jaw) = match (fits, folds) {
+        (true, _) => (DEPTH, 1.0),
+        (false, false) => (height + BLADES - DIP, PINCH),
+        (false, true) => (height + BLADES - DIP - DEEPER * (width - FLAT), (PINCH * width / FLAT).min(1.0)),
+    };
     let mut aim = at(cell, arm, body, cluster.s, point, depth)?;
-    aim.setpoint = aim.setpoint.with_jaw(jaw);
+    (aim.setpoint, aim.folds) = (aim.setpoint.with_jaw(jaw), folds);
     if aside == 0.0 {
         return Ok(aim);
     }
@@ -166,7 +178,7 @@ pub(super) fn grasp(cell: &Cell, arm: &str, body: usize, (place, manner): (Place
 pub(super) fn beside(cell: &Cell, arm: &str, aim: &Aim, by: DVec3) -> Result<Aim> {
     let tip = Pose { translation: aim.pose.translation + by, ..aim.pose };
     let reached = cell.solve(arm, &tip, &aim.setpoint)?;
-    Ok(Aim { pose: tip, setpoint: reached.setpoint, missed: reached.rejected_translation.length(), s: aim.s })
+    Ok(Aim { pose: tip, setpoint: reached.setpoint, missed: reached.rejected_translation.length(), ..*aim })
 }
 
 /// The aim of `arm` at a point of `body` near `s`: shaft through the port, jaws across the organ,
@@ -186,5 +198,6 @@ pub(super) fn at(cell: &Cell, arm: &str, body: usize, s: f64, point: DVec3, dept
     let turn = |s: &Reached| (s.setpoint.roll() - near.roll()).abs() + 10.0 * s.roll_excess.abs();
     let (a, b) = (workspace.solve(&pose(hinge), &near)?, workspace.solve(&pose(-hinge), &near)?);
     let best = if turn(&a) <= turn(&b) { a } else { b };
-    Ok(Aim { pose: best.tip, setpoint: best.setpoint, missed: best.rejected_translation.length(), s })
+    let missed = best.rejected_translation.length();
+    Ok(Aim { pose: best.tip, setpoint: best.setpoint, missed, s, folds: false })
 }

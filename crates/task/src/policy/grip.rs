@@ -17,6 +17,10 @@ const SHARES: [f64; 2] = [0.2, 0.5];
 /// of either hold nothing.
 const LEAST_OPENING: f64 = 0.15;
 
+/// A fold of wide tissue is pressed to this part of that share: most of what is between the blades
+/// then is on either side of them.
+const FOLD: f64 = 0.5;
+
 /// Change of the share for the next grasp: after tissue slipped or was missed, and after it was
 /// strained too much.
 const TIGHTER: f64 = 0.85;
@@ -26,20 +30,22 @@ const LOOSER: f64 = 1.3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Grip {
     share: f64,
+    /// Whether this closing gathers a fold of wide tissue.
+    folds: bool,
     /// Opening at which this closing met something.
     touched: Option<f64>,
 }
 
 impl Default for Grip {
     fn default() -> Self {
-        Self { share: SHARE, touched: None }
+        Self { share: SHARE, folds: false, touched: None }
     }
 }
 
 impl Grip {
-    /// A closing begins.
-    pub fn begin(&mut self) {
-        self.touched = None;
+    /// A closing begins, round tissue or, if it `folds`, on a fold of it.
+    pub fn begin(&mut self, folds: bool) {
+        (self.touched, self.folds) = (None, folds);
     }
 
     /// The opening to ask for, of jaws that are open by `opening` and pushed apart with `force`
@@ -48,7 +54,8 @@ impl Grip {
         if self.touched.is_none() && force > TOUCH {
             self.touched = Some(opening);
         }
-        self.touched.map_or(0.0, |touched| (self.share * touched).max(LEAST_OPENING).min(opening))
+        let share = if self.folds { FOLD * self.share } else { self.share };
+        self.touched.map_or(0.0, |touched| (share * touched).max(LEAST_OPENING).min(opening))
     }
 
     /// What was held slipped: tighter next time.
@@ -74,7 +81,7 @@ mod tests {
     /// Closes at full speed on a spring of `stiffness` (N per opening) from opening 0.6 on: the
     /// opening and the force where the jaws stop, by their command or by their force of 0.5 N.
     fn close(grip: &mut Grip, stiffness: f64) -> (f64, f64) {
-        grip.begin();
+        grip.begin(false);
         let force = |opening: f64| stiffness * (0.6 - opening).max(0.0);
         let mut opening: f64 = 1.0;
         for _ in 0..60 {

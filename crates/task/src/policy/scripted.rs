@@ -234,7 +234,7 @@ impl Scripted {
                     self.to[k] = self.to[k].with_jaw(0.0);
                     self.from[k] = self.from[k].with_jaw(0.0);
                 }
-                self.grip.begin();
+                self.grip.begin(self.grasp.is_some_and(|aim| aim.folds));
                 close
             }
             Phase::Drag => {

@@ -52,9 +52,11 @@ struct Steps {
     to: Vec<Setpoint>,
     last: Vec<Setpoint>,
     until: Memory,
-    /// How each arm closes and comes, and how often it has tried in its last step `grasp`.
+    /// How each arm closes and comes, whether on a fold, and how often it has tried in its last step
+    /// `grasp`.
     grips: Vec<Grip>,
     manners: Vec<Manner>,
+    folds: Vec<bool>,
     tries: Vec<usize>,
     /// The step in which each arm grasped the tissue that it holds.
     held: Vec<Option<usize>>,
@@ -66,7 +68,7 @@ impl Steps {
         let arms = episode.cell().arms();
         made.last = arms.iter().map(|(side, _)| Ok(episode.cell().setpoint(side.name())?)).collect::<Result<_>>()?;
         (made.grips, made.manners) = (vec![Grip::default(); arms.len()], vec![Manner::Fitting; arms.len()]);
-        (made.tries, made.held) = (vec![0; arms.len()], vec![None; arms.len()]);
+        (made.tries, made.held, made.folds) = (vec![0; arms.len()], vec![None; arms.len()], vec![false; arms.len()]);
         made.enter_step(episode)?;
         Ok(made)
     }
@@ -118,7 +120,9 @@ impl Steps {
                 let body = bodies_of(cell, &part.organ).first().copied();
                 let body = body.ok_or_else(|| Error::Option(format!("the scene has no organ '{}'", part.organ)))?;
                 let place = Place::InRange(part.range, 0.0);
-                let open = aim::grasp(cell, name, body, (place, self.manners[k]), 0.0)?.setpoint;
+                let aim = aim::grasp(cell, name, body, (place, self.manners[k]), 0.0)?;
+                let open = aim.setpoint;
+                self.folds[k] = aim.folds;
                 let near = phase == Phase::Enter;
                 self.to[k] = if near { open } else { cell.workspace(name)?.behind(&open, BACK) };
                 way(&self.from[k], &self.to[k], if near { SLOW } else { FAST })?
@@ -126,7 +130,7 @@ impl Steps {
             (Phase::Close, _) => {
                 self.to[k] = self.to[k].with_jaw(0.0);
                 self.from[k] = self.from[k].with_jaw(0.0);
-                self.grips[k].begin();
+                self.grips[k].begin(self.folds[k]);
                 CLOSE_S
             }
             (Phase::Move, ScriptAction::Move(by)) => {

@@ -117,7 +117,7 @@ struct Line {
 
 /// One moment of an episode.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Frame {
+pub struct SurfaceFrame {
     /// Simulated time (s).
     pub time_s: f64,
     /// How far the task is, from 0 to 1.
@@ -275,7 +275,7 @@ impl Decoder {
     }
 
     /// The next frame; `None` after the last.
-    pub fn next(&mut self) -> Said<Option<Frame>> {
+    pub fn next(&mut self) -> Said<Option<SurfaceFrame>> {
         if self.read == self.header.frames {
             return Ok(None);
         }
@@ -308,7 +308,7 @@ impl Decoder {
             organs.push((Arc::clone(&self.meshes[k]), positions));
         }
         self.read += 1;
-        Ok(Some(Frame { time_s: times[0], score: times[1], state, arms, organs, other_meshes }))
+        Ok(Some(SurfaceFrame { time_s: times[0], score: times[1], state, arms, organs, other_meshes }))
     }
 
     fn read_meshes(&mut self) -> Said<()> {

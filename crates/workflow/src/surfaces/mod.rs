@@ -8,7 +8,7 @@ mod playback;
 mod quantise;
 mod recorder;
 
-pub use format::{ActionLimits, RecordedArm, RecordedCamera, SurfacesHeader};
+pub use format::{ActionLimits, RecordedArm, RecordedCamera, SurfaceFrame, SurfacesHeader};
 pub use playback::RecordedEpisode;
 pub use recorder::{SurfaceRecorder, SurfaceWatch};
 

@@ -1,7 +1,7 @@
 //! A kept episode frame by frame, for pictures after the fact.
 
 use super::SURFACES_FILE;
-use super::format::{Decoder, Frame, SurfacesHeader, read_bytes};
+use super::format::{Decoder, SurfaceFrame, SurfacesHeader, read_bytes};
 use super::recorder::SurfaceRecorder;
 use crate::episode_replay::EpisodeReplay;
 use crate::phantoms::scene_specimen;
@@ -9,8 +9,8 @@ use crate::{Error, Result, check_interrupted};
 use std::path::{Path, PathBuf};
 use trocar_core::Progress;
 use trocar_render::{Picture, RenderSettings};
-use trocar_scene::{Frame as SceneFrame, Scene, View};
-use trocar_sensors::CameraRig;
+use trocar_scene::{Frame as SceneFrame, Imaging, Scene, View};
+use trocar_sensors::{ArmPosture, CameraRig, DrawnCell};
 use trocar_specimen::Specimen;
 use trocar_task::{EPISODE_FILE, EpisodeFile, specimen_hash};
 
@@ -22,9 +22,11 @@ pub struct RecordedEpisode {
     pub note: Option<String>,
     path: PathBuf,
     scene: Scene,
+    /// Of the scene as it is written.
+    plain: Imaging,
     specimen: Specimen,
     frames: Decoder,
-    now: Frame,
+    now: SurfaceFrame,
     /// Made with the first picture.
     rig: Option<CameraRig>,
 }
@@ -86,7 +88,16 @@ impl RecordedEpisode {
             "the specimen is not the recorded one: the organs are drawn as they were, the field below them is not"
                 .to_owned()
         });
-        Ok(Self { file, note, path, scene, specimen, frames, now, rig: None })
+        let plain = written.imaging;
+        Ok(Self { file, note, path, scene, plain, specimen, frames, now, rig: None })
+    }
+
+    /// Makes pictures with the light, exposure, gloss and tint of the scene as it is written,
+    /// instead of those that were drawn for the episode.
+    #[must_use]
+    pub fn in_plain_light(mut self) -> Self {
+        (self.scene.imaging, self.rig) = (self.plain, None);
+        self
     }
 
     /// What is known of the recording.
@@ -99,8 +110,22 @@ impl RecordedEpisode {
         &self.scene
     }
 
+    /// The cell as meshes and poses, the arms as they are now.
+    ///
+    /// # Errors
+    /// Shapes that cannot be read.
+    pub fn drawn_cell(&self) -> Result<DrawnCell> {
+        Ok(DrawnCell::without_cell(&self.scene, &self.specimen, &self.arms())?)
+    }
+
+    /// Model and posture of each arm now.
+    fn arms(&self) -> Vec<(String, ArmPosture)> {
+        let models = self.frames.header.arms.iter().map(|a| a.model.clone());
+        models.zip(self.now.arms.iter().cloned()).collect()
+    }
+
     /// The present frame.
-    pub fn now(&self) -> &Frame {
+    pub fn now(&self) -> &SurfaceFrame {
         &self.now
     }
 
@@ -111,10 +136,7 @@ impl RecordedEpisode {
     pub fn advance(&mut self) -> Result<bool> {
         let damaged = |reason: String| Error::Mismatch(format!("{}: {reason}", self.path.display()));
         let Some(next) = self.frames.next().map_err(damaged)? else { return Ok(false) };
-        // A picture of every frame is not asked for: no new mesh may be missed.
-        let pending = self.now.other_meshes && self.rig.is_none();
         self.now = next;
-        self.now.other_meshes |= pending;
         if let Some(rig) = &mut self.rig {
             rig.show(&self.now.organs, self.now.other_meshes, &self.now.arms)?;
         }
@@ -126,15 +148,15 @@ impl RecordedEpisode {
     /// # Errors
     /// A camera that the scene does not have, a size out of range.
     pub fn picture(&mut self, camera: &str, size: [usize; 2], settings: &RenderSettings) -> Result<&Picture> {
-        if self.rig.is_none() {
-            let models = self.frames.header.arms.iter().map(|a| a.model.clone());
-            let arms: Vec<_> = models.zip(self.now.arms.iter().cloned()).collect();
-            let mut rig = CameraRig::without_cell(&self.scene, &self.specimen, &arms)?;
-            rig.show(&self.now.organs, true, &self.now.arms)?;
-            self.rig = Some(rig);
-        }
-        let Some(rig) = &mut self.rig else { return Err(Error::Interrupted) };
-        Ok(rig.render_still(camera, size, settings)?)
+        let rig = match self.rig.take() {
+            Some(rig) => rig,
+            None => {
+                let mut rig = CameraRig::without_cell(&self.scene, &self.specimen, &self.arms())?;
+                rig.show(&self.now.organs, true, &self.now.arms)?;
+                rig
+            }
+        };
+        Ok(self.rig.insert(rig).render_still(camera, size, settings)?)
     }
 }
 

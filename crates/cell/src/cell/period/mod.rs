@@ -18,7 +18,7 @@ use super::Cell;
 use super::action::Action;
 use super::report::{CellReport, PeriodLog};
 use crate::{Result, World};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 impl Cell {
     /// Steps the cell by one control period. Without an action (`None`) the arms continue towards
@@ -28,7 +28,20 @@ impl Cell {
     /// An action with an error is refused with the number's index and name; nothing has changed
     /// then. If the numbers of an arm are no longer finite, a state has to be restored.
     pub fn step<'a>(&mut self, action: impl Into<Option<&'a Action>>) -> Result<CellReport> {
-        let clock = Instant::now();
+        self.step_watched(action, &mut |_| {})
+    }
+
+    /// The same with a `watch` that sees the cell after each tissue frame. What it does must not
+    /// change the steps that follow.
+    ///
+    /// # Errors
+    /// As [`step`](Self::step).
+    pub fn step_watched<'a>(
+        &mut self,
+        action: impl Into<Option<&'a Action>>,
+        watch: &mut dyn FnMut(&mut Self),
+    ) -> Result<CellReport> {
+        let (mut clock, mut wall) = (Instant::now(), Duration::ZERO);
         let mut log = PeriodLog::default();
         self.take(action.into())?;
         for frame in 0..self.frames {
@@ -39,10 +52,14 @@ impl Cell {
             self.end_tissue_frame(start, &tissue, &mut log);
             self.exchange_forces(&mut log)?;
             self.enforce_tissue_limits(tissue.min_volume_ratio, &mut log);
+            // The time of whoever watches is not the cell's.
+            wall += clock.elapsed();
+            watch(self);
+            clock = Instant::now();
         }
         self.periods += 1;
         let report = self.observe_period(log);
-        self.timing.all += clock.elapsed();
+        self.timing.all += wall + clock.elapsed();
         Ok(report)
     }
 }

@@ -141,8 +141,13 @@ impl IntegratorsExperiment {
         if self.undamped {
             return Err(Error::Mismatch("--undamped needs --mesh: the organs of the cell are damped".to_owned()));
         }
-        let specimen =
-            phantoms::specimen("phantom-a", &self.recorded.options(), &job.output().join("phantom-a"), job.progress)?;
+        let specimen = phantoms::specimen(
+            "phantom-a",
+            &self.recorded.options(),
+            None,
+            &job.output().join("phantom-a"),
+            job.progress,
+        )?;
         Ok(World::new(&specimen, SolverSettings::default(), 1)?.model)
     }
 }

@@ -107,22 +107,27 @@ impl Study for RobustnessExperiment {
             needed
         };
         specimens.make_all(&needed, job.progress)?;
-        let mut settings = format!("{} episodes", own.episodes);
-        for source in &needed {
-            settings += &format!(" {:016x}", specimen_hash(&*specimens.read(source, &trocar_core::Silent)?));
-        }
-        settings += &format!(" {:016x}", scene_hash(&scene, 0)?);
+        let hash = |condition: &Condition| -> Result<String> {
+            let sources = condition.specimens();
+            let read = |source| Ok(specimen_hash(&*specimens.read(source, &trocar_core::Silent)?));
+            let contents: Vec<u64> = sources.iter().map(read).collect::<Result<_>>()?;
+            Ok(format!("{:016x} {contents:016x?}", scene_hash(&condition.scene, 0)?))
+        };
         // The controllers see no pictures: unless the task is judged by one, their episodes are those
         // of the scene as it is written.
         let judged = scene.program()?.measures.iter().any(|measure| matches!(measure, Measure::Visible(..)));
         let (same, run): (Vec<&Condition>, Vec<&Condition>) = all.iter().partition(|c| c.pictures && !judged);
+        // Each condition is known by its own scene and specimens, so that a run with more factors
+        // uses those of an earlier one again.
+        let keyed = run.into_iter().map(|c| Ok((format!("{} {}", c.key(), hash(c)?), c)));
+        let keyed: Vec<(String, &Condition)> = keyed.collect::<Result<_>>()?;
         let Outcomes { mut rows, resumed } = job.trials(
             "conditions",
-            &settings,
-            &run,
-            |c| c.key(),
+            "",
+            &keyed,
+            |(key, _)| key.clone(),
             own.threads,
-            |condition, progress| row(condition, &specimens, progress),
+            |(_, condition), progress| row(condition, &specimens, progress),
         )?;
         let written = rows.first().map_or_else(Vec::new, |row| row.policies.clone());
         rows.extend(same.into_iter().map(|condition| with_outcomes(condition, written.clone())));

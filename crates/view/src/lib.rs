@@ -1,0 +1,38 @@
+//! The live view: a cell in a browser while it runs, and instruments in the operator's hands.
+//!
+//! A [`Server`] simulates in one thread, makes frames in another, and serves the page and the wire
+//! (docs/guides/view-wire.md) on a port of this machine. Each client has a slot for one frame: a
+//! slow one misses frames, and the simulation never waits. What clients send changes nothing but
+//! through the actions of the episode, so that what an operator does is an episode file.
+
+pub mod client;
+mod encode;
+mod error;
+mod frame;
+mod http;
+mod hub;
+mod inbox;
+mod measured;
+mod message;
+mod operator;
+mod outbox;
+mod pace;
+mod page;
+mod picture;
+mod policy;
+mod protocol;
+mod record;
+mod server;
+mod session;
+mod shapes;
+mod show;
+mod snapshot;
+mod socket;
+mod source;
+mod table;
+mod values;
+
+pub use error::{Error, Result};
+pub use page::build_page;
+pub use server::{Options, Server};
+pub use source::{Building, Source};
