@@ -32,9 +32,9 @@ import { VERSION } from "./wire/messages.ts";
 import { Session } from "./wire/session.ts";
 
 /** From where the first view looks: in front of the table, to its right, above it. */
-const HOME_FROM = new THREE.Vector3(0.62, -0.78, 0.82);
-/** The first view shows the organs and this much round them (m): the ports and the wrists. */
-const HOME_MARGIN_M = 0.035;
+const HOME_FROM = new THREE.Vector3(0.5, -0.8, 0.85);
+/** The first view shows the organs and this much round them (m): the instruments and the ports. */
+const HOME_MARGIN_M = 0.05;
 
 function start(): void {
   const token = new URLSearchParams(location.search).get("token");
@@ -82,9 +82,7 @@ function start(): void {
   listen(world, transport, () => drive.clutched);
 
   session.on("organs", () => {
-    const box = organs.bounds();
-    if (session.scene) for (const port of session.scene.header.ports) box.expandByPoint(new THREE.Vector3().fromArray(port.centre_m));
-    world.setHome(box.expandByScalar(HOME_MARGIN_M), HOME_FROM);
+    world.setHome(organs.bounds().expandByScalar(HOME_MARGIN_M), HOME_FROM);
   });
   session.on("problem", (problem) => say(sentence(problem), "bad"));
   session.on("error", (error) => say(sentence(error.message), "bad"));

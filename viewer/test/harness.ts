@@ -39,8 +39,8 @@ export function inside<T>(page: Page, look: (trocar: Inside) => T): Promise<T> {
 }
 
 /** Waits until a function of the page's objects is true; the page's policy forbids what playwright's own wait does. */
-export async function until(page: Page, look: (trocar: Inside) => unknown, what: string): Promise<void> {
-  const end = Date.now() + 20_000;
+export async function until(page: Page, look: (trocar: Inside) => unknown, what: string, limitMs = 20_000): Promise<void> {
+  const end = Date.now() + limitMs;
   while (!(await page.evaluate(`Boolean(window.trocar && (${look.toString()})(window.trocar))`))) {
     if (Date.now() > end) throw new Error(`not in time: ${what}`);
     await page.waitForTimeout(40);
@@ -84,13 +84,18 @@ export async function says(page: Page, id: string, text: RegExp): Promise<void> 
 export async function onFake(browser: Browser, look: Look = {}, before?: (page: Page) => Promise<unknown>) {
   const server = new FakeServer(DIST);
   const { page, errors } = await openPage(browser, { width: 760, height: 460, ...look });
-  await before?.(page);
-  await page.goto(await server.listen());
-  await until(page, (trocar) => trocar.session.framesReceived > 1 && trocar.world.pictures > 0, "the first picture");
   const close = async (): Promise<void> => {
     await page.context().close();
     server.close();
   };
+  try {
+    await before?.(page);
+    await page.goto(await server.listen(), { timeout: 60_000 });
+    await until(page, (trocar) => trocar.session.framesReceived > 1 && trocar.world.pictures > 0, "the first picture", 60_000);
+  } catch (error) {
+    await close();
+    throw error;
+  }
   return { server, page, errors, close };
 }
 

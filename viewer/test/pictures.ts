@@ -40,7 +40,7 @@ const LOOKS: { name: string; width: number; height: number; dark: boolean; prepa
 
 for (const { name, width, height, dark, prepare } of LOOKS) {
   const { page, errors } = await openPage(await launch(), { width, height, dark });
-  await page.goto(url);
+  await page.goto(url, { timeout: 60_000 });
   await expectSoon(() => inside(page, (trocar) => Boolean(trocar?.session.framesReceived)), true, "frames", 90_000);
   if (time) {
     await expectSoon(async () => (await inside(page, ({ session }) => session.status!.time_s)) > 0 && !(await at(page, "scrub").isDisabled()), true, "the episode", 90_000);
@@ -49,7 +49,7 @@ for (const { name, width, height, dark, prepare } of LOOKS) {
   }
   await prepare(page);
   await page.waitForTimeout(4000);
-  await page.screenshot({ path: `${folder}/${name}.jpg`, type: "jpeg", quality: 82 });
+  await page.screenshot({ path: `${folder}/${name}.jpg`, type: "jpeg", quality: 82, timeout: 60_000 });
   if (errors.length > 0) console.log(name, errors);
   await page.context().close();
 }

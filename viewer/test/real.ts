@@ -38,7 +38,7 @@ test("on a simulator", { skip }, async (t) => {
     browser = await launch();
     ({ page, errors } = await openPage(browser, { width: 760, height: 460 }));
     await page.addInitScript(FAKE_GAMEPAD);
-    await page.goto(through.address);
+    await page.goto(through.address, { timeout: 60_000 });
     for (let i = 0; i < 5; i += 1) {
       if (await inside(page, (trocar) => Boolean(trocar?.session.framesReceived))) break;
       await until(page, (trocar) => trocar.session.framesReceived > 0, "frames").catch(() => undefined);

@@ -140,6 +140,7 @@ export class DrivePanel {
     let view = this.tests.get(device.id);
     if (!view) this.tests.set(device.id, (view = beginTest(device)));
     this.testHost.replaceChildren(view.root);
+    this.use.disabled = !view.test.done;
     if (device === this.mouse) this.testHost.prepend(testPad(this.mouse.tested));
     this.operator.say("Move each axis both ways. The marks move as the arm will; flip an axis that goes the wrong way.", "plain");
   }

@@ -103,7 +103,7 @@ function modeText(status: NonNullable<Session["status"]>): string {
   if (status.seeking) return "Seeking";
   if (status.mode === "ended") return status.passed ? "Ended: passed" : "Ended: not passed";
   const place = status.mode === "review" ? `Review of ${number(status.head_s, 1, "s")}` : `Live, of ${number(status.length_s, 0, "s")}`;
-  if (status.mode === "review" && status.exact === false) return "Review: differs from the file";
+  if (status.mode === "review" && status.exact === false) return "Differs from the file";
   if (status.mode === "review" && status.exact === true) return `${place}, exact`;
   return place;
 }
