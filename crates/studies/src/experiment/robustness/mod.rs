@@ -113,15 +113,15 @@ impl Study for RobustnessExperiment {
             let contents: Vec<u64> = sources.iter().map(read).collect::<Result<_>>()?;
             Ok(format!("{:016x} {contents:016x?}", scene_hash(&condition.scene, 0)?))
         };
-        // The controllers see no pictures: unless the task is judged by one, their episodes are those
-        // of the scene as it is written.
+        // The controllers see no pictures: unless the task is judged by one, their episodes would be
+        // those of the scene as it is written, and counted again.
         let judged = scene.program()?.measures.iter().any(|measure| matches!(measure, Measure::Visible(..)));
-        let (same, run): (Vec<&Condition>, Vec<&Condition>) = all.iter().partition(|c| c.pictures && !judged);
+        let run = all.iter().filter(|condition| judged || !condition.pictures);
         // Each condition is known by its own scene and specimens, so that a run with more factors
         // uses those of an earlier one again.
-        let keyed = run.into_iter().map(|c| Ok((format!("{} {}", c.key(), hash(c)?), c)));
+        let keyed = run.map(|c| Ok((format!("{} {}", c.key(), hash(c)?), c)));
         let keyed: Vec<(String, &Condition)> = keyed.collect::<Result<_>>()?;
-        let Outcomes { mut rows, resumed } = job.trials(
+        let Outcomes { rows, resumed } = job.trials(
             "conditions",
             "",
             &keyed,
@@ -129,8 +129,6 @@ impl Study for RobustnessExperiment {
             own.threads,
             |(_, condition), progress| row(condition, &specimens, progress),
         )?;
-        let written = rows.first().map_or_else(Vec::new, |row| row.policies.clone());
-        rows.extend(same.into_iter().map(|condition| with_outcomes(condition, written.clone())));
         let result = RobustnessResult {
             scene: scene.name,
             variation: own.variation.name(),

@@ -71,7 +71,7 @@ fn summary(name: &str, row: &RobustnessRow) -> Vec<String> {
 fn one_at_a_time(r: &RobustnessResult) -> Section {
     let lead = format!(
         "Each factor at its values in order, with all others as the scene is written: episodes of {} that passed. The \
-         controllers see no pictures, so factors of pictures change nothing, unless the task is judged by a picture.",
+         controllers see no pictures: factors of pictures are left out, unless the task is judged by a picture.",
         r.episodes
     );
     let curves = r.curves();
