@@ -57,6 +57,15 @@ pub(crate) struct Client {
     news: Condvar,
 }
 
+impl Outbox {
+    /// From when on the next frame may be sent, half a period before its place in the client's
+    /// rhythm; none if any time is right.
+    fn frame_due(&self) -> Option<Instant> {
+        let hz = self.wants.frames_hz;
+        self.due[0].filter(|_| hz > 0.0).map(|due| due.checked_sub(period(hz) / 2).unwrap_or(due))
+    }
+}
+
 /// What a client's writer does next.
 pub(crate) enum Next {
     Reply(Outgoing),
@@ -84,14 +93,15 @@ impl Client {
         self.news.notify_one();
     }
 
-    /// Puts a frame into its slot, in the place of one that it has not got.
+    /// Puts a frame into its slot, in the place of one that it has not got. One that comes too early
+    /// for the client's rate waits there: it may be the last for a while.
     pub fn offer(&self, frame: &Arc<Frame>, now: Instant) {
         let mut outbox = lock(&self.outbox);
-        let hz = outbox.wants.frames_hz;
-        if hz <= 0.0 || !is_due(&mut outbox.due[0], hz, now) {
+        if outbox.wants.frames_hz <= 0.0 {
             return;
         }
-        if outbox.frame.replace(Arc::clone(frame)).is_some() {
+        let late = outbox.frame_due() <= Some(now);
+        if outbox.frame.replace(Arc::clone(frame)).is_some() && late {
             outbox.dropped += 1;
         }
         drop(outbox);
@@ -101,8 +111,7 @@ impl Client {
     /// Whether a frame would be sent, and measurements.
     pub fn wants_now(&self, now: Instant) -> bool {
         let outbox = lock(&self.outbox);
-        let hz = outbox.wants.frames_hz;
-        !outbox.closed && hz > 0.0 && outbox.due[0].is_none_or(|due| due <= now + period(hz) / 2)
+        !outbox.closed && outbox.wants.frames_hz > 0.0 && outbox.frame_due() <= Some(now)
     }
 
     /// Waits for what is to be sent, at most for `most`.
@@ -117,14 +126,22 @@ impl Client {
                 outbox.bytes -= reply.len();
                 return Next::Reply(reply);
             }
-            if let Some(frame) = outbox.frame.take() {
+            let now = Instant::now();
+            let due = outbox.frame.is_some().then(|| outbox.frame_due().unwrap_or(now));
+            if due.is_some_and(|due| due <= now)
+                && let Some(frame) = outbox.frame.take()
+            {
+                let hz = outbox.wants.frames_hz;
+                if hz > 0.0 {
+                    is_due(&mut outbox.due[0], hz, now);
+                }
                 let whole = std::mem::take(&mut outbox.whole);
                 return Next::Frame(frame, outbox.dropped, whole);
             }
-            let left = end.saturating_duration_since(Instant::now());
-            if left == Duration::ZERO {
+            if end <= now {
                 return Next::Quiet;
             }
+            let left = due.unwrap_or(end).min(end).saturating_duration_since(now);
             outbox = self.news.wait_timeout(outbox, left).unwrap_or_else(PoisonError::into_inner).0;
         }
     }
