@@ -241,7 +241,7 @@ def test_addresses():
 
 @pytest.fixture
 def viewer(program):
-    """The program, if it can view. The test runs in real time, which a slow machine does not keep."""
+    """The program, if it can view. Its test runs in real time, which slow machines do not keep."""
     if "TROCAR_REALTIME" not in os.environ:
         pytest.skip("runs in real time: set TROCAR_REALTIME=1 on an idle machine")
     if subprocess.run([program, "view", "--help"], capture_output=True).returncode:
