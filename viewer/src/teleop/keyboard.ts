@@ -21,6 +21,8 @@ export class Keyboard implements Device {
   private readonly down = new Set<string>();
   /** Keys that went down since the last reading: a tap counts even between two readings. */
   private readonly tapped = new Set<string>();
+  /** Whether the clutch key went up since the last reading: that counts, too, if it is down again. */
+  private lifted = false;
   /** While the axis test runs, keys count wherever the focus is. */
   testing = false;
 
@@ -41,13 +43,17 @@ export class Keyboard implements Device {
       this.down.add(event.code);
       if (event.code !== CLUTCH_KEY) this.tapped.add(event.code);
     });
-    addEventListener("keyup", (event) => this.down.delete(event.code));
+    addEventListener("keyup", (event) => {
+      this.down.delete(event.code);
+      if (event.code === CLUTCH_KEY) this.lifted = true;
+    });
     canvas.addEventListener("blur", () => this.clear());
   }
 
   read(): Reading[] {
     const reading = atRest();
-    reading.clutch = this.clutch;
+    reading.clutch = this.clutch && !this.lifted;
+    this.lifted = false;
     for (const code of new Set([...this.down, ...this.tapped])) {
       const key = KEYS[code];
       if (key) reading.rates[key[0]] += key[1];

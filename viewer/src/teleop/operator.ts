@@ -67,7 +67,9 @@ export class Operator {
     this.letGo(null);
     device?.clear();
     this.device = device && test ? { device, test } : null;
-    for (const arm of this.arms) arm.blocked = true;
+    // A clutch that is pressed already must be released first.
+    const readings = this.device ? test!.correct(device!.read()) : [];
+    this.arms.forEach((input, arm) => (input.blocked = readings[arm]?.clutch ?? true));
   }
 
   /** The device was lost. */
