@@ -5,10 +5,12 @@
 //! slow one misses frames, and the simulation never waits. What clients send changes nothing but
 //! through the actions of the episode, so that what an operator does is an episode file.
 
+mod arm_columns;
 pub mod client;
 mod encode;
 mod error;
 mod frame;
+mod haptic;
 mod http;
 mod hub;
 mod inbox;

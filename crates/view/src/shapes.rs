@@ -1,8 +1,8 @@
 //! What does not change from frame to frame: the messages `scene` and `organs`.
 
+use crate::arm_columns::ARM_COLUMNS;
 use crate::error::Result;
 use crate::message::{Binary, Data};
-use crate::snapshot::ARM_COLUMNS;
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

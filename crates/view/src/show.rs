@@ -3,8 +3,8 @@
 
 use crate::encode::Encoder;
 use crate::error::Result;
+use crate::haptic::haptic;
 use crate::hub::Hub;
-use crate::measured::haptic;
 use crate::operator::{Actor, Operators, arm_of};
 use crate::pace::Pace;
 use crate::policy;

@@ -1,6 +1,7 @@
 //! What is copied from the cell for a frame. The simulation does this and no more; the frame is
 //! made in another thread.
 
+use crate::arm_columns::ARM_COLUMNS;
 use crate::error::Result;
 use crate::hub::Wants;
 use crate::shapes::{Topology, fresh, pose_numbers};
@@ -10,55 +11,6 @@ use std::sync::Arc;
 use std::time::Instant;
 use trocar_cell::Cell;
 use trocar_sensors::DrawnCell;
-
-/// Names of the numbers of an arm in a frame.
-pub(crate) const ARM_COLUMNS: [&str; 45] = [
-    "tip_x_m",
-    "tip_y_m",
-    "tip_z_m",
-    "tip_qw",
-    "tip_qx",
-    "tip_qy",
-    "tip_qz",
-    "jaw",
-    "jaw_rad",
-    "commanded_x_m",
-    "commanded_y_m",
-    "commanded_z_m",
-    "commanded_qw",
-    "commanded_qx",
-    "commanded_qy",
-    "commanded_qz",
-    "measured_0",
-    "measured_1",
-    "measured_2",
-    "measured_3",
-    "measured_4",
-    "commanded_0",
-    "commanded_1",
-    "commanded_2",
-    "commanded_3",
-    "commanded_4",
-    "contact_x_n",
-    "contact_y_n",
-    "contact_z_n",
-    "constraint_x_n",
-    "constraint_y_n",
-    "constraint_z_n",
-    "jaw_force_n",
-    "rcm_mm",
-    "rcm_peak_mm",
-    "attached",
-    "held_back",
-    "guarded",
-    "load_limited",
-    "contact_disabled",
-    "blades_disabled",
-    "held_organ",
-    "held_s",
-    "follow",
-    "slip_mm",
-];
 
 /// A copy of an organ.
 #[derive(Clone)]
