@@ -106,7 +106,7 @@ impl Hub {
         Some(client)
     }
 
-    /// Removes a client. Its seats are free, and the simulation is told of arms that it drove.
+    /// Removes a client, frees its seats, and tells the simulation which arms it drove.
     pub fn leave(&self, id: ClientId) {
         let mut people = lock(&self.people);
         people.clients.remove(&id);

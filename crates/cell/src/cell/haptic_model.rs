@@ -17,7 +17,7 @@ pub struct HapticModel {
     /// Force (N) and torque (N m) of tissue on the instrument then: contact and constraint.
     pub wrench: Wrench,
     /// Decrease of force and torque by translation (m) and rotation vector (rad) of the tip over a
-    /// frame. Symmetric, positive semidefinite.
+    /// frame. Symmetric, and positive semidefinite up to rounding.
     pub stiffness: [[f64; 6]; 6],
 }
 

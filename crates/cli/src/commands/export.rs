@@ -77,6 +77,6 @@ fn check(python: &str) -> Result<()> {
         return Ok(());
     }
     let said = String::from_utf8_lossy(&tried.stderr);
-    let last = said.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("no reason is told");
+    let last = said.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("it gave no reason");
     Err(Error::Mismatch(format!("{python} cannot import trocar.export: {last}; {right}")))
 }

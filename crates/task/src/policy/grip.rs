@@ -17,8 +17,8 @@ const SHARES: [f64; 2] = [0.2, 0.5];
 /// of either hold nothing.
 const LEAST_OPENING: f64 = 0.15;
 
-/// A fold of wide tissue is pressed to this part of that share: most of what is between the blades
-/// then is on either side of them.
+/// Wide tissue is pressed to this part of that share, because most of the fold lies beside the
+/// blades.
 const FOLD: f64 = 0.5;
 
 /// Change of the share for the next grasp: after tissue slipped or was missed, and after it was

@@ -188,8 +188,8 @@ impl QuasiNewtonSolver {
     }
 }
 
-/// Derivative of a contact's force at `x` by the motion of what is touched (N/m); what slips has none
-/// along the surface. None where no force acts.
+/// Derivative of a contact's force at `x` (N/m) with respect to the motion of what it touches. A
+/// contact that slips has none along the surface. None where no force acts.
 fn tangent(contact: &Contact, x: Vec3A) -> Option<Mat3A> {
     let push = contact.push(x)?;
     let across = if contact.slide(x).is_some() { 0.0 } else { push.across };

@@ -70,7 +70,7 @@ pub(crate) struct Session {
     stale: bool,
 }
 
-/// Builds and runs a session until `stop` is set. What fails is told to the clients and returned.
+/// Builds and runs a session until `stop` is set. Tells the clients of an error and returns it.
 ///
 /// # Errors
 /// What is shown cannot be built.
@@ -191,7 +191,7 @@ impl Session {
         Ok(())
     }
 
-    /// Gives a frame of what is there.
+    /// Sends a frame of the present state.
     fn frame(&mut self) -> Result<()> {
         let around = Around { hub: &self.hub, encoder: &self.encoder, pace: &mut self.pace };
         self.show.show(&around, 0)
