@@ -6,7 +6,7 @@ use trocar_geometry::{OrganAxis, TetQuality};
 use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen};
 use trocar_tissue::{
     BodyContact, BodyDescription, Collider, ConstitutiveModel, Event, Load, Material, Model, ModelBuilder,
-    SolverSettings, State, Stepper, Support, SupportField, ToolForce, ToolMotion, pins,
+    SolverSettings, State, Stepper, Support, SupportField, ToolContact, ToolForce, ToolMotion, pins,
 };
 
 /// Length of a frame (s).
@@ -47,6 +47,8 @@ pub struct World {
 pub struct Surroundings {
     /// How organs touch each other; None if they pass through each other.
     pub body_contact: Option<BodyContact>,
+    /// What of organs touches instruments.
+    pub tool_contact: ToolContact,
     /// Pairs of organs without contact, by their indices in the specimen.
     pub filtered: Vec<[usize; 2]>,
     /// Friction of the bed that organs lie on, with their imprints; None for no bed.
@@ -60,6 +62,7 @@ impl Default for Surroundings {
     fn default() -> Self {
         Self {
             body_contact: Some(BodyContact::default()),
+            tool_contact: ToolContact::default(),
             filtered: Vec::new(),
             bed_friction: Some(SUPPORT_FRICTION),
             floating: Vec::new(),
@@ -111,7 +114,7 @@ impl World {
         threads: usize,
     ) -> Result<Self> {
         let up = specimen.up.normalize();
-        let mut builder = ModelBuilder::new().gravity(-GRAVITY * up);
+        let mut builder = ModelBuilder::new().gravity(-GRAVITY * up).tool_contact(surroundings.tool_contact);
         if let Some(contact) = surroundings.body_contact {
             builder = builder.body_contact(contact);
         }

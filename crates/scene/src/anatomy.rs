@@ -248,6 +248,18 @@ pub enum ScheduleName {
     Adaptive,
 }
 
+/// What of tissue touches instruments.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ToolContactKind {
+    /// The vertices of its surface: an instrument that is thinner than triangles are wide can pass
+    /// between them.
+    #[default]
+    Vertices,
+    /// Its vertices, edges and triangles.
+    Surface,
+}
+
 /// Solver and contact of the tissue.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -256,6 +268,8 @@ pub struct Tissue {
     pub schedule: ScheduleName,
     /// Distance at which contact between organs is looked for (mm).
     pub contact_offset_mm: f64,
+    /// What of tissue touches instruments: vertices or surface.
+    pub tool_contact: ToolContactKind,
     /// Distance at which tissue rests on the tips of instruments (mm).
     pub tip_rest_offset_mm: f64,
     /// Coulomb friction of tissue on tissue and of instruments on tissue.
@@ -274,6 +288,7 @@ impl Default for Tissue {
         Self {
             schedule: ScheduleName::Fast,
             contact_offset_mm: 1.5,
+            tool_contact: ToolContactKind::Vertices,
             tip_rest_offset_mm: 1.5,
             friction: 0.6,
             // A wall of 1 mm (two layers of 0.5) over the 5 mm of the blades, at a strength of 1

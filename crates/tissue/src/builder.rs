@@ -11,6 +11,7 @@ use crate::body::surface::Surface;
 use crate::body::{BodyData, Corner, Edge, Vertex};
 use crate::{
     Body, BodyContact, Collider, ConstitutiveModel, Error, Material, Model, Result, StableNeoHookean, Support,
+    ToolContact,
 };
 use glam::{DVec3, Vec3A};
 use trocar_geometry::{TetMesh, TetQuality};
@@ -67,6 +68,7 @@ pub struct ModelBuilder {
     filtered: Vec<[usize; 2]>,
     colliders: Vec<Collider>,
     body_contact: Option<BodyContact>,
+    tool_contact: ToolContact,
 }
 
 impl Default for ModelBuilder {
@@ -86,6 +88,7 @@ impl ModelBuilder {
             filtered: Vec::new(),
             colliders: Vec::new(),
             body_contact: None,
+            tool_contact: ToolContact::default(),
         }
     }
 
@@ -142,6 +145,12 @@ impl ModelBuilder {
         self
     }
 
+    /// Sets what of the bodies' surfaces touches tools; [`ToolContact::Vertices`] otherwise.
+    pub fn tool_contact(mut self, contact: ToolContact) -> Self {
+        self.tool_contact = contact;
+        self
+    }
+
     /// Excludes the pair of bodies `a` and `b` from contact. If `a` is `b`, the body does not touch
     /// itself.
     ///
@@ -194,6 +203,7 @@ impl ModelBuilder {
             filtered: self.filtered,
             colliders: self.colliders,
             body_contact: self.body_contact,
+            tool_contact: self.tool_contact,
         })
     }
 }

@@ -1,7 +1,7 @@
 //! What acts on a model during one frame, as its bodies see it.
 
 use crate::grasp::travel;
-use crate::{Body, Collider, Grasp, Load, ToolMotion};
+use crate::{Body, Collider, Grasp, Load, ToolContact, ToolMotion};
 use glam::{DVec3, Vec3A};
 
 /// What acts on a body from outside during one frame.
@@ -21,6 +21,8 @@ pub(crate) struct Frame<'a> {
     pub loads: &'a [Load],
     /// Parts of tools that touch bodies.
     pub colliders: &'a [Collider],
+    /// What touches these parts.
+    pub tool_contact: ToolContact,
     /// Whether the calling thread does all the work.
     pub single_thread: bool,
 }

@@ -95,8 +95,10 @@ impl<S: Solver> Island<S> {
         for (m, slot) in slots.iter().enumerate() {
             let contacts = slot.solver.contacts().map_or(&[][..], ContactSet::list);
             for contact in contacts.iter().filter(|contact| matches!(contact.source, Source::Collider(_))) {
-                if let Some(push) = contact.push(x(m, contact.vertex)) {
-                    visit(slot.index, contact.vertex, -push.gradient.as_dvec3());
+                if let Some(push) = contact.push(contact.site.at(|vertex| x(m, vertex))) {
+                    for (vertex, share) in contact.site.shares() {
+                        visit(slot.index, vertex, (-share * push.gradient).as_dvec3());
+                    }
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! What never changes while stepping.
 
-use crate::{Body, BodyContact, Collider};
+use crate::{Body, BodyContact, Collider, ToolContact};
 use glam::DVec3;
 
 /// Everything that is constant over a simulation. Only [`crate::ModelBuilder`] and [`crate::sever`]
@@ -13,6 +13,7 @@ pub struct Model {
     pub(crate) filtered: Vec<[usize; 2]>,
     pub(crate) colliders: Vec<Collider>,
     pub(crate) body_contact: Option<BodyContact>,
+    pub(crate) tool_contact: ToolContact,
 }
 
 impl Model {
@@ -34,6 +35,11 @@ impl Model {
     /// Contact between bodies; None if they pass through each other.
     pub fn body_contact(&self) -> Option<BodyContact> {
         self.body_contact
+    }
+
+    /// What of the bodies' surfaces touches tools.
+    pub fn tool_contact(&self) -> ToolContact {
+        self.tool_contact
     }
 
     /// Whether bodies `a` and `b` touch each other: both exist, and the pair was not filtered

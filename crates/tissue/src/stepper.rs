@@ -112,9 +112,11 @@ impl Stepper {
             return StepReport { divergence: Some(why), ..StepReport::default() };
         }
         let grasps = std::mem::take(&mut state.grasps);
-        let (dt, gravity, colliders) = (self.dt, model.gravity, &model.colliders[..]);
+        let (dt, gravity) = (self.dt, model.gravity);
+        let (colliders, tool_contact) = (&model.colliders[..], model.tool_contact);
         let single_thread = self.pool.is_none();
-        let frame = Frame { dt, gravity, index: 0, grasps: &grasps, tools, loads, colliders, single_thread };
+        let frame =
+            Frame { dt, gravity, index: 0, grasps: &grasps, tools, loads, colliders, tool_contact, single_thread };
 
         self.solvers.begin_frame(state, &frame);
         self.solvers.build_islands(model, state, &frame);

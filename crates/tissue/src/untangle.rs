@@ -166,6 +166,7 @@ mod tests {
             tools: &[],
             loads: &[],
             colliders: &[],
+            tool_contact: crate::ToolContact::Vertices,
             single_thread: true,
         };
         let body = &model.bodies[0];

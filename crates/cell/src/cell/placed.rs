@@ -4,9 +4,9 @@ use crate::{Error, Result, Surroundings};
 use glam::DVec3;
 use trocar_core::Pose;
 use trocar_geometry::OrganAxis;
-use trocar_scene::{FIELD, PinEnd, PinRule, Scene, SupportKind};
+use trocar_scene::{FIELD, PinEnd, PinRule, Scene, SupportKind, ToolContactKind};
 use trocar_specimen::{End, Organ, Specimen};
-use trocar_tissue::BodyContact;
+use trocar_tissue::{BodyContact, ToolContact};
 
 /// A specimen in the cell frame, and the surroundings of its organs.
 #[derive(Clone, Debug)]
@@ -68,6 +68,10 @@ impl Placed {
         let support = &scene.tissue.support;
         let surroundings = Surroundings {
             body_contact: Some(contact),
+            tool_contact: match scene.tissue.tool_contact {
+                ToolContactKind::Vertices => ToolContact::Vertices,
+                ToolContactKind::Surface => ToolContact::Surface,
+            },
             filtered,
             bed_friction: (support.kind == SupportKind::Imprint).then_some(support.friction),
             floating,

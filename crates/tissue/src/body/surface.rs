@@ -130,7 +130,8 @@ impl Surface {
         Some((normal, distance.copysign(height)))
     }
 
-    fn fan(&self, vertex: u32) -> &[u32] {
+    /// The triangles at a vertex.
+    pub fn fan(&self, vertex: u32) -> &[u32] {
         &self.fans[self.fan_start[vertex as usize] as usize..self.fan_start[vertex as usize + 1] as usize]
     }
 

@@ -2,6 +2,7 @@
 
 use super::contact::{Contact, Friction};
 use super::memory::Source;
+use super::site::Site;
 use crate::frame::Frame;
 use crate::{Body, Grasp};
 use glam::Vec3A;
@@ -30,7 +31,7 @@ impl CompliantNode {
         let (_, captured) = grasp.prescribed_node(&pose, self.node as usize);
         let place = (captured - body.origin).as_vec3a() + (pose.rotation * self.slid.as_dvec3()).as_vec3a();
         Some(Contact {
-            vertex: self.vertex,
+            site: Site::vertex(self.vertex),
             source: Source::Grasp(self.grasp, self.node),
             normal: (pose.rotation * compliance.closing.normalize_or_zero()).as_vec3a(),
             point: place,

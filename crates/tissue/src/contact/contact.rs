@@ -1,26 +1,28 @@
-//! A contact as solvers see it: a vertex at a plane, with Coulomb friction towards a place.
+//! A contact as solvers see it: a point of the surface at a plane, with Coulomb friction towards a
+//! place.
 //!
-//! Plane and place are held during a substep, so that no vertex gets behind a tool within it. A
-//! spring pushes a vertex behind the plane out. A second spring of the same stiffness holds it to
+//! Plane and place are held during a substep, so that no point gets behind a tool within it. A
+//! spring pushes a point behind the plane out. A second spring of the same stiffness holds it to
 //! its place along the plane, until it would pull harder than Coulomb's law allows: then the place
 //! follows ([`Contact::slide`]). A load below the limit is borne at a fixed displacement; nothing
 //! creeps.
 
 use super::memory::Source;
+use super::site::Site;
 use glam::{Mat3A, Vec3A};
 
-/// A vertex at a plane.
+/// A point of the surface at a plane.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Contact {
-    /// The body's vertex.
-    pub vertex: u32,
+    /// The point of the body's surface.
+    pub site: Site,
     /// What it touches.
     pub source: Source,
     /// Unit normal of the plane, towards the free side.
     pub normal: Vec3A,
     /// A point of the plane when the substep ends, in the body's frame (m).
     pub point: Vec3A,
-    /// Where friction holds the vertex without force at that time (m); its component along the
+    /// Where friction holds the point without force at that time (m); its component along the
     /// normal does not matter.
     pub place: Vec3A,
     /// (N/m)
@@ -55,7 +57,7 @@ impl Contact {
         (x - self.point).dot(self.normal)
     }
 
-    /// Greatest friction force on a vertex at `x` (N).
+    /// Greatest friction force on a point at `x` (N).
     #[inline(always)]
     pub fn limit(&self, x: Vec3A) -> f32 {
         match self.friction {
@@ -87,6 +89,19 @@ impl Contact {
         Some(Push { gradient: along * height * self.normal + across * off, along, across })
     }
 
+    /// The same contact as one of a `vertex` of the site alone, which bears a `share` of it, while the
+    /// others stay where they are; each vertex at `x`.
+    pub fn of_vertex(&self, vertex: u32, share: f32, x: impl Fn(u32) -> Vec3A) -> Self {
+        let (here, at) = (x(vertex), self.site.at(&x));
+        Self {
+            site: Site::vertex(vertex),
+            point: here - (self.height(at) / share) * self.normal,
+            place: here - (at - self.place) / share,
+            stiffness: self.stiffness * share * share,
+            ..*self
+        }
+    }
+
     /// Displacement along the plane from the place (m).
     #[inline(always)]
     fn off(&self, x: Vec3A) -> Vec3A {
@@ -94,7 +109,7 @@ impl Contact {
         off - off.dot(self.normal) * self.normal
     }
 
-    /// How far the place follows a vertex at `x` that pulls beyond the limit (m). None if it stays.
+    /// How far the place follows a point at `x` that pulls beyond the limit (m). None if it stays.
     pub fn slide(&self, x: Vec3A) -> Option<Vec3A> {
         let (off, limit) = (self.off(x), self.limit(x));
         let pull = self.stiffness * off.length();
@@ -103,7 +118,7 @@ impl Contact {
 }
 
 impl Push {
-    /// The positive definite block of the vertex: friction's secant.
+    /// The positive definite block of the point: friction's secant.
     #[inline(always)]
     pub fn block(&self, normal: Vec3A) -> Mat3A {
         let k = self.along - self.across;

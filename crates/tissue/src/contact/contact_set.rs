@@ -6,8 +6,11 @@
 
 use super::compliant_grasp::{self, CompliantNode};
 use super::contact::{Contact, Friction};
+use super::feature_contacts::FeatureContacts;
 use super::force::ToolForce;
 use super::memory::{Anchor, Source};
+use super::site::Site;
+use super::tool_contact::ToolContact;
 use super::tool_placement::{self, Placed};
 use crate::Body;
 use crate::frame::Frame;
@@ -32,7 +35,11 @@ pub(crate) struct ContactSet {
     /// Vertices that may touch something in this frame or hang on a tool, ascending.
     near: Vec<u32>,
     compliant: Vec<CompliantNode>,
+    /// By vertex, then those of edges and triangles.
     contacts: Vec<Contact>,
+    /// Number of those of vertices.
+    of_vertices: usize,
+    features: FeatureContacts,
     /// First contact of each vertex; that of the next vertex is the end.
     first: Vec<u32>,
     /// Present contacts with other bodies, and the first of each vertex: for the sweeps.
@@ -65,6 +72,8 @@ impl ContactSet {
             near: Vec::with_capacity(body.len()),
             compliant: Vec::with_capacity(body.len()),
             contacts: Vec::with_capacity(2 * surface.len()),
+            of_vertices: 0,
+            features: FeatureContacts::default(),
             places: Vec::with_capacity(2 * surface.len()),
             anchors: Vec::with_capacity(2 * surface.len()),
             next_anchors: Vec::with_capacity(2 * surface.len()),
@@ -101,6 +110,9 @@ impl ContactSet {
         let anchors = 2 * self.surface.len();
         state.anchors.reserve(anchors.saturating_sub(state.anchors.len()));
         self.find_near(frame, body, state);
+        if frame.tool_contact == ToolContact::Surface {
+            self.features.begin_frame(frame, body, state, &self.placed, self.reach);
+        }
     }
 
     fn mark_fixed(&mut self, frame: &Frame<'_>, body: &Body) {
@@ -224,7 +236,7 @@ impl ContactSet {
                         Source::Body(_) | Source::Grasp(..) => 0.0,
                     };
                     contacts.push(Contact {
-                        vertex: *vertex,
+                        site: Site::vertex(*vertex),
                         source,
                         normal,
                         point,
@@ -251,6 +263,8 @@ impl ContactSet {
             }
             *first = next;
         }
+        self.of_vertices = contacts.len();
+        self.features.find(frame, body, &self.placed, self.reach, x, &mut contacts);
         (self.contacts, self.places) = (contacts, places);
     }
 
@@ -279,6 +293,7 @@ impl ContactSet {
             loads: &[],
             colliders: &[],
             single_thread: true,
+            tool_contact: ToolContact::Vertices,
         };
         contacts.reach = f32::INFINITY;
         contacts.near.clone_from(&contacts.surface);
@@ -305,22 +320,40 @@ impl ContactSet {
         any(&self.first) || any(&self.first_pressed)
     }
 
-    /// Sets the contacts with other bodies, by vertex.
-    pub fn press(&mut self, pressed: &[Contact]) {
+    /// Sets the contacts with other bodies, by vertex, and adds those of edges and triangles as
+    /// contacts of each of their vertices while the others stay where they are, at `x`.
+    pub fn press(&mut self, pressed: &[Contact], x: impl Fn(u32) -> Vec3A) {
         self.pressed.clear();
         self.first_pressed.fill(0);
-        for contact in pressed.iter().filter(|contact| !self.fixed[contact.vertex as usize]) {
-            self.pressed.push(*contact);
-            self.first_pressed[contact.vertex as usize + 1] += 1;
+        let free = |contact: &&Contact| !self.fixed[contact.site.first() as usize];
+        self.pressed.extend(pressed.iter().filter(free));
+        let others = self.pressed.len();
+        for contact in &self.contacts[self.of_vertices..] {
+            for (vertex, share) in contact.site.shares().filter(|(_, share)| *share > MIN_SHARE) {
+                if !self.fixed[vertex as usize] {
+                    self.pressed.push(contact.of_vertex(vertex, share, &x));
+                }
+            }
+        }
+        if self.pressed.len() > others {
+            self.pressed.sort_unstable_by_key(|contact| contact.site.first());
+        }
+        for contact in &self.pressed {
+            self.first_pressed[contact.site.first() as usize + 1] += 1;
         }
         for i in 1..self.first_pressed.len() {
             self.first_pressed[i] += self.first_pressed[i - 1];
         }
     }
 
+    /// Whether contacts that depend on other vertices were set, or are to be.
+    pub fn is_pressed(&self) -> bool {
+        !self.pressed.is_empty() || self.contacts.len() > self.of_vertices
+    }
+
     /// Whether no contact has a force, with the vertices at `x`.
     pub fn is_idle(&self, x: impl Fn(usize) -> Vec3A) -> bool {
-        self.contacts.iter().all(|contact| contact.push(x(contact.vertex as usize)).is_none())
+        self.contacts.iter().all(|contact| contact.push(contact.site.at(|vertex| x(vertex as usize))).is_none())
     }
 
     /// Stiffness of the contacts and the grasp of a vertex that the quasi-Newton solver's matrix
@@ -338,11 +371,11 @@ impl ContactSet {
         self.next_anchors.clear();
         self.forces.fill(ToolForce::default());
         let (mut hanging, mut counted) = (0, None);
-        for (contact, place) in self.contacts.iter().zip(&self.places) {
-            let here = x(contact.vertex as usize);
+        for (contact, place) in self.contacts[..self.of_vertices].iter().zip(&self.places) {
+            let here = contact.site.at(|vertex| x(vertex as usize));
             let push = contact.push(here);
             if let Source::Grasp(..) = contact.source {
-                while self.compliant[hanging].vertex < contact.vertex {
+                while self.compliant[hanging].vertex < contact.site.first() {
                     hanging += 1;
                 }
                 let held = &mut self.compliant[hanging];
@@ -368,19 +401,21 @@ impl ContactSet {
                 },
                 (Some(by), _) => *place + by,
             };
-            self.next_anchors.push(Anchor { vertex: contact.vertex, source: contact.source, place });
+            self.next_anchors.push(Anchor { vertex: contact.site.first(), source: contact.source, place });
             if let Source::Collider(c) = contact.source {
                 let tool = frame.colliders[c as usize].tool;
                 if let (Some(force), Some(Some(placed))) = (self.forces.get_mut(tool), self.placed.get(c as usize)) {
                     let arm = body.origin + here.as_dvec3() - placed.to.translation;
                     force.contact += Wrench::at(push.gradient.as_dvec3(), arm);
                     force.pressing += f64::from(contact.stiffness * -contact.height(here));
-                    force.touching += usize::from(counted != Some((contact.vertex, tool)));
-                    counted = Some((contact.vertex, tool));
+                    force.touching += usize::from(counted != Some((contact.site.first(), tool)));
+                    counted = Some((contact.site.first(), tool));
                 }
             }
         }
         std::mem::swap(&mut self.anchors, &mut self.next_anchors);
+        let contacts = &self.contacts[self.of_vertices..];
+        self.features.end_substep(frame, body, &self.placed, contacts, &x, &mut self.forces);
         for held in &self.compliant {
             let grasp = &frame.grasps[held.grasp as usize];
             if let (Some(force), Some(tool)) = (self.forces.get_mut(grasp.tool), frame.tools.get(grasp.tool)) {
@@ -393,6 +428,7 @@ impl ContactSet {
     /// Ends a frame: the state keeps the anchors.
     pub fn end_frame(&self, state: &mut BodyState) {
         state.anchors.clone_from(&self.anchors);
+        self.features.end_frame(state);
     }
 
     /// Forces of the body on each tool in the last substep.
@@ -405,6 +441,9 @@ impl ContactSet {
         &self.compliant
     }
 }
+
+/// Vertices with a smaller share of a contact do not bear it in sweeps, which divide by it.
+const MIN_SHARE: f32 = 1e-6;
 
 /// Marks a vertex's first contact while they are being found.
 const MARK: u32 = 1 << 31;

@@ -1,5 +1,6 @@
 //! What friction remembers from frame to frame: it belongs to the state.
 
+use super::tool_features::FeatureKey;
 use glam::Vec3A;
 
 /// What a vertex touches.
@@ -23,6 +24,16 @@ pub(crate) struct Anchor {
     /// In the frame of the touched surface: the tool's, or for a support the body's (m). It moves
     /// with a tool.
     pub place: Vec3A,
+}
+
+/// How far friction's spring between a point of an edge or triangle and a collider is stretched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FeatureAnchor {
+    pub collider: u32,
+    /// The edge or triangle, and the end of the axis.
+    pub feature: FeatureKey,
+    /// The point from where friction holds it without force, in the tool's frame (m).
+    pub stretch: Vec3A,
 }
 
 /// How far friction's spring between a vertex and another body is stretched.

@@ -11,6 +11,7 @@ use super::contact::{Contact, Friction, Push};
 use super::coupling::Coupling;
 use super::members::Members;
 use super::memory::{Source, Stretch};
+use super::site::Site;
 use crate::Body;
 use crate::frame::Frame;
 use glam::Vec3A;
@@ -133,7 +134,7 @@ impl Pairs {
                 corners: near.triangle,
                 weights: near.weights,
                 contact: Contact {
-                    vertex: near.vertex,
+                    site: Site::vertex(near.vertex),
                     source: Source::Body(near.other),
                     normal: near.normal.into(),
                     point: Vec3A::ZERO,
@@ -286,7 +287,7 @@ impl Pairs {
             // Share of the vertex's motion by which the offset changes.
             let share = if role.corner == 3 { 1.0 } else { -pair.weights[role.corner as usize] };
             self.pressed.push(Contact {
-                vertex: role.vertex,
+                site: Site::vertex(role.vertex),
                 normal: share.signum() * pair.contact.normal,
                 point: here - (height / share) * pair.contact.normal,
                 place: here - off / share,

@@ -3,7 +3,7 @@
 use crate::frame::Frame;
 use crate::grasp::travel;
 use crate::{Body, Collider, Grasp};
-use glam::Vec3A;
+use glam::{DVec3, Vec3A};
 use trocar_core::Pose;
 
 /// Places the colliders of a substep between two shares of the frame; None: the tool has no motion.
@@ -46,5 +46,11 @@ impl Placed {
             reach: (collider.rest_offset + travel(&from, &to, arm)) as f32,
             grips,
         }
+    }
+
+    /// Points of the collider at the substep's beginning, in the frame of `body` (m).
+    pub fn at_beginning(&self, body: &Body, points: [DVec3; 2]) -> [Vec3A; 2] {
+        let pose = self.from.inverse();
+        points.map(|p| (pose.transform(p) - body.origin).as_vec3a())
     }
 }

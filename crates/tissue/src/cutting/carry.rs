@@ -141,7 +141,8 @@ fn motion(whole: &Body, state: &BodyState, piece: &Body, nodes: &[u32]) -> BodyS
         x: from.iter().map(|i| state.x[*i]).collect(),
         v: from.iter().map(|i| state.v[*i]).collect(),
         anchors: from.iter().enumerate().flat_map(|(k, i)| anchors(state, *i, k as u32)).collect(),
-        // Cut tissue settles against its neighbours from the beginning.
+        // Cut tissue settles against its neighbours and tools from the beginning.
+        feature_anchors: Vec::new(),
         stretches: Vec::new(),
         repair: state.repair,
         warm: WarmStart {

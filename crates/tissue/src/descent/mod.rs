@@ -98,18 +98,18 @@ pub(crate) fn sweep_substep<S: Sweeps>(slots: &mut [BodySlot<S>], pairs: &mut Pa
     for BodySlot { index, body, solver, state, report, .. } in slots.iter_mut() {
         let (descent, contacts) = solver.sweeps();
         iterations = descent.settings.iterations;
-        contacts.press(&[]);
+        contacts.press(&[], |i| state.x[i as usize]);
         descent.start(&frame.of(*index), share, body, contacts, state, report);
     }
     pairs.list_roles();
     for _ in 0..iterations {
         for member in 0..slots.len() {
-            if !pairs.is_empty() {
-                let pressed = pairs.contacts_of(slots, member);
-                slots[member].solver.sweeps().1.press(pressed);
-            }
+            let pressed = if pairs.is_empty() { &[][..] } else { pairs.contacts_of(slots, member) };
             let BodySlot { body, solver, state, .. } = &mut slots[member];
             let (descent, contacts) = solver.sweeps();
+            if !pressed.is_empty() || contacts.is_pressed() {
+                contacts.press(pressed, |i| state.x[i as usize]);
+            }
             descent.sweep(frame, body, contacts, state);
         }
     }

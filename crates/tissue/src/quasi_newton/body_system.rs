@@ -7,7 +7,7 @@ use super::layout::Layout;
 use super::rigid_modes::RigidModes;
 use super::sleep::{RestCache, Sleep};
 use super::system::System;
-use crate::contact::{ContactSet, Source};
+use crate::contact::{Contact, ContactSet, Source};
 use crate::descent::BodyDescent;
 use crate::frame::Frame;
 use crate::lanes::{Row, dot_rows};
@@ -163,7 +163,7 @@ impl QuasiNewtonSolver {
     }
 
     /// Adds to the matrix the tools and supports that press at the substep's beginning or at its
-    /// free end. Returns false if it has them all.
+    /// free end, of vertices. Returns false if it has them all.
     pub fn add_contacts_to_system(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) -> bool {
         let (x, targets, number) = (&self.iterate.x, &self.iterate.targets, &self.layout.number);
         let places = |vertex: u32| {
@@ -172,9 +172,11 @@ impl QuasiNewtonSolver {
         };
         let mut new = false;
         let contacts = self.touching.contacts.list().iter();
-        for contact in contacts.filter(|contact| !matches!(contact.source, Source::Grasp(..))) {
-            let presses = places(contact.vertex).iter().any(|x| contact.height(*x) < 0.0);
-            let known = &mut state.warm.supported[contact.vertex as usize];
+        let pressed = |contact: &&Contact| contact.site.is_vertex() && !matches!(contact.source, Source::Grasp(..));
+        for contact in contacts.filter(pressed) {
+            let vertex = contact.site.first();
+            let presses = places(vertex).iter().any(|x| contact.height(*x) < 0.0);
+            let known = &mut state.warm.supported[vertex as usize];
             new |= presses && !*known;
             *known |= presses;
         }
@@ -233,11 +235,16 @@ impl QuasiNewtonSolver {
     pub fn take_gradient(&mut self, h: f32) {
         let level = self.level;
         dispatch!(level, simd => self.gradient_at(simd, h));
-        let Self { iterate: Iterate { x, next_gradient, .. }, touching, loads, layout, .. } = self;
+        let Self { iterate: Iterate { x, next_gradient, .. }, touching, loads, layout, held, .. } = self;
         for (contact, limit) in touching.contacts.list().iter().zip(&touching.limits) {
-            let i = layout.number[contact.vertex as usize] as usize;
-            if let Some(push) = contact.push_within(position(&x[i]), *limit) {
-                add(&mut next_gradient[i], push.gradient);
+            let number = |vertex: u32| layout.number[vertex as usize] as usize;
+            if let Some(push) = contact.push_within(contact.site.at(|vertex| position(&x[number(vertex)])), *limit) {
+                for (vertex, share) in contact.site.shares() {
+                    let i = number(vertex);
+                    if i < layout.free && !held[i] {
+                        add(&mut next_gradient[i], share * push.gradient);
+                    }
+                }
             }
         }
         if loads.any {
@@ -273,12 +280,18 @@ impl QuasiNewtonSolver {
         let Self { iterate: Iterate { x, gradient, next_gradient, .. }, touching, layout, held, .. } = self;
         std::mem::swap(gradient, next_gradient);
         for (contact, limit) in touching.contacts.list().iter().zip(&mut touching.limits) {
-            let i = layout.number[contact.vertex as usize] as usize;
-            let x = position(&x[i]);
+            let number = |vertex: u32| layout.number[vertex as usize] as usize;
+            let x = contact.site.at(|vertex| position(&x[number(vertex)]));
             let now = contact.limit(x);
-            if now != *limit && !held[i] {
+            if now != *limit {
                 let push = |limit| contact.push_within(x, limit).map_or(Vec3A::ZERO, |push| push.gradient);
-                add(&mut gradient[i], push(now) - push(*limit));
+                let change = push(now) - push(*limit);
+                for (vertex, share) in contact.site.shares() {
+                    let i = number(vertex);
+                    if i < layout.free && !held[i] {
+                        add(&mut gradient[i], share * change);
+                    }
+                }
             }
             *limit = now;
         }

@@ -51,9 +51,9 @@ impl IslandSystem<'_> {
         for BodySlot { solver, .. } in slots.iter_mut() {
             let Some(mut rigid) = solver.rigid else { continue };
             for (contact, limit) in solver.touching.contacts.list().iter().zip(&solver.touching.limits) {
-                let x = solver.at(contact.vertex);
-                if let Some(push) = contact.push_within(x, *limit) {
-                    rigid.add(&push, contact.normal, [(x, 1.0)].into_iter());
+                if let Some(push) = contact.push_within(contact.site.at(|vertex| solver.at(vertex)), *limit) {
+                    let arms = contact.site.shares().map(|(vertex, share)| (solver.at(vertex), share));
+                    rigid.add(&push, contact.normal, arms);
                 }
             }
             solver.rigid = Some(rigid);

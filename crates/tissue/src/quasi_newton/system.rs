@@ -106,9 +106,20 @@ impl System {
         }
         pressing.fill(0.0);
         for contact in contacts.list().iter().filter(|contact| !matches!(contact.source, Source::Grasp(..))) {
-            let i = layout.number[contact.vertex as usize] as usize;
-            if i < layout.free && !held[i] && contact.height(position(&x[i])) < 0.0 {
-                pressing[i] = contact.stiffness;
+            let number = |vertex: u32| layout.number[vertex as usize] as usize;
+            if contact.height(contact.site.at(|vertex| position(&x[number(vertex)]))) >= 0.0 {
+                continue;
+            }
+            for (vertex, share) in contact.site.shares() {
+                let i = number(vertex);
+                if i < layout.free && !held[i] {
+                    // An edge or triangle, which comes after the vertices, adds to them.
+                    pressing[i] = if contact.site.is_vertex() {
+                        contact.stiffness
+                    } else {
+                        pressing[i] + share * contact.stiffness
+                    };
+                }
             }
         }
         // What remains in `pressing` after this is new.

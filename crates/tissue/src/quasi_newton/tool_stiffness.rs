@@ -121,15 +121,19 @@ impl QuasiNewtonSolver {
 
     /// The springs at free nodes of the body, one a node: between them and the tools, and those of
     /// the preconditioner between them and what stands still.
-    fn springs(&self, body: &Body, group: &ToolGroup<'_>) -> Vec<Spring> {
+    fn springs<'a>(&'a self, body: &Body, group: &ToolGroup<'_>) -> Vec<Spring> {
         let about = (group.about - body.origin).as_vec3a();
         let contacts = self.touching.contacts.list();
         // Tissue in jaws does not slip along the blades: the grasp holds it.
         let held = contacts.iter().any(|c| matches!(c.source, Source::Grasp(..)) && group.moves(c.source));
         let mut springs: Vec<Spring> = Vec::new();
-        let mut of_node = contacts.chunk_by(|a, b| a.vertex == b.vertex).peekable();
+        let shares = |contact: &'a Contact| contact.site.shares().map(move |(vertex, share)| (vertex, share, contact));
+        let mut touched: Vec<(u32, f32, &Contact)> = contacts.iter().flat_map(shares).collect();
+        // Those of edges and triangles come last in the list.
+        touched.sort_by_key(|(vertex, ..)| *vertex);
+        let mut of_node = touched.chunk_by(|a, b| a.0 == b.0).peekable();
         for vertex in 0..body.len() {
-            let touched = of_node.next_if(|contacts| contacts[0].vertex as usize == vertex).unwrap_or_default();
+            let touched = of_node.next_if(|contacts| contacts[0].0 as usize == vertex).unwrap_or_default();
             let Some(node) = self.free_node(vertex as u32) else { continue };
             let most = self.system.spring(node);
             if most <= 0.0 {
@@ -137,8 +141,11 @@ impl QuasiNewtonSolver {
             }
             let x = position(&self.iterate.x[node]);
             let sum = |moves: bool| -> Mat3A {
-                let those = touched.iter().filter(|contact| group.moves(contact.source) == moves);
-                those.filter_map(|contact| tangent(contact, x)).fold(Mat3A::ZERO, |sum, k| sum + k)
+                let those = touched.iter().filter(|(.., contact)| group.moves(contact.source) == moves);
+                let part = |(_, share, contact): &(u32, f32, &Contact)| {
+                    Some(tangent(contact, contact.site.at(|vertex| self.at(vertex)))? * *share)
+                };
+                those.filter_map(part).fold(Mat3A::ZERO, |sum, k| sum + k)
             };
             let (moving, still) = (sum(true), sum(false));
             let all = Mat3A::from_diagonal(Vec3::splat(most));

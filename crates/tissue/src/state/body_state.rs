@@ -1,7 +1,7 @@
 //! The part of a state that belongs to one body: its physics, and the solvers' warm start.
 
 use crate::Body;
-use crate::contact::{Anchor, Source, Stretch};
+use crate::contact::{Anchor, FeatureAnchor, Source, Stretch};
 use glam::Vec3A;
 use xxhash_rust::xxh3::Xxh3;
 
@@ -14,6 +14,8 @@ pub(crate) struct BodyState {
     pub v: Vec<Vec3A>,
     /// Anchors of friction on supports and tools, by vertex.
     pub anchors: Vec<Anchor>,
+    /// Those of edges and triangles on tools, by collider and vertices.
+    pub feature_anchors: Vec<FeatureAnchor>,
     /// Stretch of friction's springs to other bodies, by vertex and body.
     pub stretches: Vec<Stretch>,
     /// The repair before the next frame.
@@ -57,6 +59,7 @@ impl BodyState {
             x,
             v: vec![Vec3A::ZERO; body.len()],
             anchors: Vec::with_capacity(2 * body.surface_vertices().len()),
+            feature_anchors: Vec::new(),
             stretches: Vec::new(),
             repair: Repair::default(),
             warm: WarmStart { falling: vec![0.0; body.len()], supported: vec![false; body.len()] },
@@ -66,10 +69,11 @@ impl BodyState {
     /// Copies another state of the same body without allocating. Destructuring names every field:
     /// a new one that is not copied does not compile.
     pub fn copy_from(&mut self, other: &Self) {
-        let Self { x, v, anchors, stretches, repair, warm: WarmStart { falling, supported } } = other;
+        let Self { x, v, anchors, feature_anchors, stretches, repair, warm: WarmStart { falling, supported } } = other;
         self.x.copy_from_slice(x);
         self.v.copy_from_slice(v);
         self.anchors.clone_from(anchors);
+        self.feature_anchors.clone_from(feature_anchors);
         self.stretches.clone_from(stretches);
         self.repair = *repair;
         self.warm.falling.copy_from_slice(falling);
@@ -79,7 +83,7 @@ impl BodyState {
     /// Hashes every bit. Destructuring names every field: a new one that is not hashed does not
     /// compile.
     pub fn hash(&self, hash: &mut Xxh3) {
-        let Self { x, v, anchors, stretches, repair, warm } = self;
+        let Self { x, v, anchors, feature_anchors, stretches, repair, warm } = self;
         let WarmStart { falling, supported } = warm;
         let Repair { disturbed, relax } = repair;
         for vector in x.iter().chain(v) {
@@ -98,6 +102,11 @@ impl BodyState {
             };
             [*vertex, kind, *number].iter().for_each(|k| hash.update(&k.to_le_bytes()));
             hash_vector(hash, *place);
+        }
+        for FeatureAnchor { collider, feature: (vertices, end), stretch } in feature_anchors {
+            [collider].into_iter().chain(vertices).for_each(|k| hash.update(&k.to_le_bytes()));
+            hash.update(&[*end]);
+            hash_vector(hash, *stretch);
         }
         for Stretch { vertex, other, by } in stretches {
             [vertex, other].iter().for_each(|k| hash.update(&k.to_le_bytes()));

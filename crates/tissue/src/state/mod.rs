@@ -89,6 +89,7 @@ impl State {
             to.x.copy_from_slice(&from.x);
             to.v.copy_from_slice(&from.v);
             to.anchors.clear();
+            to.feature_anchors.clear();
             to.anchors.extend(from.anchors.iter().filter(|anchor| matches!(anchor.source, Source::Support(_))));
         }
         true

@@ -4,7 +4,7 @@
 
 use super::State;
 use super::body_state::{BodyState, Repair, WarmStart};
-use crate::contact::{Anchor, Source, Stretch};
+use crate::contact::{Anchor, FeatureAnchor, Source, Stretch};
 use crate::{BodyDescription, Compliance, ConstitutiveModel, Grasp, Material, Model, ModelBuilder};
 use glam::{DVec3, Vec3A};
 use trocar_core::Pose;
@@ -33,6 +33,8 @@ fn full(model: &Model) -> State {
     let mut state = State::new(model);
     let body = &mut state.bodies[0];
     body.anchors.push(Anchor { vertex: 1, source: Source::Collider(2), place: Vec3A::new(1.0, 2.0, 3.0) });
+    let stretch = Vec3A::new(7.0, 8.0, 9.0);
+    body.feature_anchors.push(FeatureAnchor { collider: 1, feature: ([0, 1, 0], 1), stretch });
     body.stretches.push(Stretch { vertex: 2, other: 3, by: Vec3A::new(4.0, 5.0, 6.0) });
     let compliance = Compliance {
         stiffness: 1.0,
@@ -63,10 +65,15 @@ fn vectors(list: fn(&mut BodyState) -> &mut Vec<Vec3A>, vertices: usize) -> Vec<
 /// A change of each number of the body's state. Destructuring names every field: a new one that has
 /// no change here does not compile.
 fn body_changes(body: &BodyState) -> Vec<Change> {
-    let BodyState { x, v, anchors, stretches, repair: Repair { disturbed, relax }, warm } = body;
+    let BodyState { x, v, anchors, feature_anchors, stretches, repair: Repair { disturbed, relax }, warm } = body;
     let WarmStart { falling, supported } = warm;
-    assert!(!*disturbed && !*relax && anchors.len() == 1 && stretches.len() == 1);
     let mut all = vectors(|body| &mut body.x, x.len());
+    assert!(!*disturbed && !*relax && anchors.len() == 1 && stretches.len() == 1);
+    let [FeatureAnchor { collider: _, feature: _, stretch: _ }] = feature_anchors[..] else { panic!("one is there") };
+    all.push(change(|s| s.bodies[0].feature_anchors[0].collider += 1));
+    all.extend((0..3).map(|k| change(move |s| s.bodies[0].feature_anchors[0].feature.0[k] += 1)));
+    all.push(change(|s| s.bodies[0].feature_anchors[0].feature.1 += 1));
+    all.extend((0..3).map(|c| change(move |s| s.bodies[0].feature_anchors[0].stretch[c] += 1.0)));
     all.extend(vectors(|body| &mut body.v, v.len()));
     all.extend((0..falling.len()).map(|i| change(move |s| s.bodies[0].warm.falling[i] += 0.5)));
     all.extend((0..supported.len()).map(|i| change(move |s| s.bodies[0].warm.supported[i] ^= true)));

@@ -1,0 +1,194 @@
+//! Contacts of a body's edges and triangles with round parts of tools.
+//!
+//! Vertices alone leave gaps: a blade that is thinner than a triangle is wide passes between them.
+//! So the point of an edge or triangle that is nearest to the axis of a capsule touches it as well.
+//! Its stiffness is that of its vertices, and falls to 0 where the point reaches one of them, which
+//! touches by itself: the force does not jump where a blade slides from feature to feature.
+//!
+//! Friction is a spring whose stretch is kept in the tool's frame, by feature: the point may move
+//! along the edge from substep to substep.
+
+use super::contact::{Contact, Friction};
+use super::force::ToolForce;
+use super::memory::{FeatureAnchor, Source};
+use super::shape::Shape;
+use super::site::Site;
+use super::tool_features::{self, Feature, FeatureKey};
+use super::tool_placement::Placed;
+use crate::Body;
+use crate::frame::Frame;
+use crate::state::BodyState;
+use glam::{DVec3, Vec3A};
+use trocar_core::Wrench;
+
+/// The contacts of a body's edges and triangles.
+#[derive(Default)]
+pub(super) struct FeatureContacts {
+    /// Triangles that colliders may meet in the frame, by collider, and the end of each collider's.
+    near: Vec<u32>,
+    ends: Vec<usize>,
+    /// Vertices of these triangles and of those around them.
+    vertices: Vec<u32>,
+    /// Their positions at the substep's beginning, by vertex (m).
+    x: Vec<Vec3A>,
+    /// Scratch: features of one collider.
+    found: Vec<Feature>,
+    /// The feature of each contact of the substep.
+    keys: Vec<FeatureKey>,
+    /// Sorted by collider and feature.
+    anchors: Vec<FeatureAnchor>,
+    next_anchors: Vec<FeatureAnchor>,
+}
+
+impl FeatureContacts {
+    /// Begins a frame: finds the triangles that the `placed` colliders may meet in it. A vertex at
+    /// most `reach` from a surface may touch it (m).
+    pub fn begin_frame(
+        &mut self,
+        frame: &Frame<'_>,
+        body: &Body,
+        state: &BodyState,
+        placed: &[Option<Placed>],
+        reach: f32,
+    ) {
+        self.anchors.clone_from(&state.feature_anchors);
+        self.near.clear();
+        self.ends.clear();
+        self.vertices.clear();
+        self.x.resize(body.len(), Vec3A::ZERO);
+        for (collider, placed) in frame.colliders.iter().zip(placed) {
+            if let (Some((ends, radius)), Some(placed)) = (axis(&collider.shape), placed) {
+                let [a, b] = placed.at_beginning(body, ends);
+                let far = reach + placed.reach + radius;
+                let near = |t: &u32| {
+                    let [p, q, r] = body.surface.triangles[*t as usize].map(|i| state.x[i as usize]);
+                    let size = (q - p).length_squared().max((r - p).length_squared()).sqrt();
+                    distance_squared(p, a, b) <= (far + size) * (far + size)
+                };
+                self.near.extend((0..body.surface.triangles.len() as u32).filter(near));
+            }
+            self.ends.push(self.near.len());
+        }
+        for t in &self.near {
+            for corner in body.surface.triangles[*t as usize] {
+                for around in body.surface.fan(corner) {
+                    self.vertices.extend(body.surface.triangles[*around as usize]);
+                }
+            }
+        }
+        self.vertices.sort_unstable();
+        self.vertices.dedup();
+    }
+
+    /// Appends the contacts of a substep that begins with the vertices at `x`.
+    pub fn find(
+        &mut self,
+        frame: &Frame<'_>,
+        body: &Body,
+        placed: &[Option<Placed>],
+        reach: f32,
+        x: impl Fn(usize) -> Vec3A,
+        contacts: &mut Vec<Contact>,
+    ) {
+        self.keys.clear();
+        if self.near.is_empty() {
+            return;
+        }
+        self.vertices.iter().for_each(|i| self.x[*i as usize] = x(*i as usize));
+        let mut first = 0;
+        for (c, end) in self.ends.iter().enumerate() {
+            let triangles = &self.near[first..*end];
+            first = *end;
+            let (collider, Some(placed)) = (&frame.colliders[c], &placed[c]) else { continue };
+            let Some((ends, radius)) = axis(&collider.shape).filter(|_| !triangles.is_empty()) else { continue };
+            let far = reach + placed.reach + radius;
+            let on_axis = placed.at_beginning(body, ends);
+            tool_features::find(&body.surface, &self.x, triangles, on_axis, far, &mut self.found);
+            for Feature { key, site } in &self.found {
+                let now = site.at(|vertex| self.x[vertex as usize]);
+                let p = placed.from.transform(body.origin + now.as_dvec3());
+                let nearest = collider.shape.nearest(p);
+                let height = nearest.distance - collider.rest_offset;
+                let local = |place: DVec3| (placed.to.transform(place) - body.origin).as_vec3a();
+                let by = |anchor: &FeatureAnchor| (anchor.collider, anchor.feature).cmp(&(c as u32, *key));
+                let known = self.anchors.binary_search_by(by).map(|k| self.anchors[k].stretch);
+                self.keys.push(*key);
+                contacts.push(Contact {
+                    site: *site,
+                    source: Source::Collider(c as u32),
+                    normal: (placed.to.rotation * nearest.normal).as_vec3a(),
+                    point: local(p - height * nearest.normal),
+                    place: local(p - known.unwrap_or(Vec3A::ZERO).as_dvec3()),
+                    stiffness: stiffness(body, site),
+                    friction: Friction::Coulomb(if placed.grips { 0.0 } else { collider.friction as f32 }),
+                });
+            }
+        }
+    }
+
+    /// Ends a substep: friction's springs follow what slips, and tools feel the forces.
+    pub fn end_substep(
+        &mut self,
+        frame: &Frame<'_>,
+        body: &Body,
+        placed: &[Option<Placed>],
+        contacts: &[Contact],
+        x: impl Fn(usize) -> Vec3A,
+        forces: &mut [ToolForce],
+    ) {
+        self.next_anchors.clear();
+        for (contact, key) in contacts.iter().zip(&self.keys) {
+            let Source::Collider(c) = contact.source else { continue };
+            let Some(placed) = &placed[c as usize] else { continue };
+            let here = contact.site.at(|vertex| x(vertex as usize));
+            let Some(push) = contact.push(here) else { continue };
+            let stretch = here - contact.place - contact.slide(here).unwrap_or(Vec3A::ZERO);
+            let along = stretch - stretch.dot(contact.normal) * contact.normal;
+            self.next_anchors.push(FeatureAnchor {
+                collider: c,
+                feature: *key,
+                stretch: (placed.to.rotation.inverse() * along.as_dvec3()).as_vec3a(),
+            });
+            if let Some(force) = forces.get_mut(frame.colliders[c as usize].tool) {
+                let arm = body.origin + here.as_dvec3() - placed.to.translation;
+                force.contact += Wrench::at(push.gradient.as_dvec3(), arm);
+                force.pressing += f64::from(contact.stiffness * -contact.height(here));
+                force.touching += 1;
+            }
+        }
+        std::mem::swap(&mut self.anchors, &mut self.next_anchors);
+    }
+
+    /// Ends a frame: the state keeps the stretches.
+    pub fn end_frame(&self, state: &mut BodyState) {
+        state.feature_anchors.clone_from(&self.anchors);
+    }
+}
+
+/// The axis of a round shape and its radius (m).
+fn axis(shape: &Shape) -> Option<([DVec3; 2], f32)> {
+    match shape {
+        Shape::Sphere { centre, radius } => Some(([*centre; 2], *radius as f32)),
+        Shape::Capsule { ends, radius } => Some((*ends, *radius as f32)),
+        Shape::HalfSpace { .. } | Shape::Box { .. } | Shape::Hull(_) => None,
+    }
+}
+
+/// Stiffness of a point between vertices over that of a vertex. Only a few of them bear a tool that
+/// is thinner than a triangle is wide.
+const STIFFNESS: f32 = 4.0;
+
+/// Stiffness of a point between vertices (N/m): 0 at a vertex, all of it in the middle of an edge.
+/// Inside a triangle it continues that of the edges.
+fn stiffness(body: &Body, site: &Site) -> f32 {
+    let [u, v, w] = site.weights;
+    let share = STIFFNESS * (4.0 * (u * v + v * w + w * u)).min(1.0);
+    share * site.shares().map(|(i, weight)| weight * body.vertices[i as usize].contact_stiffness).sum::<f32>()
+}
+
+/// Squared distance of a point from a segment (m2).
+fn distance_squared(p: Vec3A, a: Vec3A, b: Vec3A) -> f32 {
+    let along = b - a;
+    let share = ((p - a).dot(along) / along.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+    (p - a - share * along).length_squared()
+}

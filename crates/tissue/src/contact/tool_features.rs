@@ -1,0 +1,128 @@
+//! Where the surface of a body meets round parts of tools between its vertices.
+//!
+//! A capsule is all points near its axis, a segment. A segment is nearest to a surface at a vertex,
+//! at a point of an edge, or at an end of the segment above a triangle's inside. Vertices are
+//! examined one by one ([`super::ContactSet`]). Here are the other two: edges against the axis and
+//! triangles against its ends. Together they are all ways in which an axis can go through a surface
+//! (Chen and others 2025, "Offset geometric contact").
+//!
+//! A pair counts where its distance is a minimum, whether or not another pair is nearer: a rod that
+//! lies flat touches at both its ends. An edge counts if the axis is outside of it, towards neither
+//! of its triangles. In a shallow valley it counts too ([`VALLEY`]), because what presses on an edge
+//! makes one.
+
+use super::site::Site;
+use crate::body::surface::{Surface, foot};
+use glam::Vec3A;
+
+/// Distance of a point of the axis from the surface below which it has no direction (m).
+const MIN_DISTANCE: f32 = 1e-6;
+
+/// Squared sine of the angle below which an edge and the axis are parallel.
+const PARALLEL: f32 = 1e-6;
+
+/// Sine of the greatest angle by which the axis is towards a triangle of an edge.
+const VALLEY: f32 = 0.5;
+
+/// A feature's name: its vertices, ascending, but that an edge repeats the first at the end; and the
+/// end of the axis that a triangle meets, 0 for an edge.
+pub(crate) type FeatureKey = ([u32; 3], u8);
+
+/// A point of an edge or of a triangle's inside that is near an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Feature {
+    pub key: FeatureKey,
+    pub site: Site,
+}
+
+/// The features of `triangles` of a surface, vertices at `x`, within `reach` (m) of the axis from
+/// `a` to `b`, each once, by key.
+pub(super) fn find(
+    surface: &Surface,
+    x: &[Vec3A],
+    triangles: &[u32],
+    axis: [Vec3A; 2],
+    reach: f32,
+    features: &mut Vec<Feature>,
+) {
+    features.clear();
+    let ends = if axis[0] == axis[1] { 1 } else { 2 };
+    for t in triangles {
+        let mut vertices = surface.triangles[*t as usize];
+        for k in 0..3 {
+            features.extend(of_edge(surface, x, [vertices[k], vertices[(k + 1) % 3]], axis, reach));
+        }
+        let normal = normal(x, vertices);
+        // The name begins with the smallest vertex; the turn stays.
+        let least = (0..3).min_by_key(|k| vertices[*k]).unwrap_or(0);
+        vertices.rotate_left(least);
+        for (end, place) in axis.iter().enumerate().take(ends) {
+            let foot = foot(*place, vertices.map(|i| x[i as usize]));
+            let inside = foot.weights.iter().all(|weight| *weight > 0.0);
+            if inside && is_near(foot.off, reach) && foot.off.dot(normal) > 0.0 {
+                features.push(Feature { key: (vertices, end as u8), site: Site { vertices, weights: foot.weights } });
+            }
+        }
+    }
+    features.sort_unstable_by_key(|feature| feature.key);
+    features.dedup_by_key(|feature| feature.key);
+}
+
+/// The point of an edge that is nearest to the axis, if it counts.
+fn of_edge(surface: &Surface, x: &[Vec3A], edge: [u32; 2], axis: [Vec3A; 2], reach: f32) -> Option<Feature> {
+    // The same numbers whichever triangle the edge is of.
+    let [i, k] = [edge[0].min(edge[1]), edge[0].max(edge[1])];
+    let ends = [x[i as usize], x[k as usize]];
+    let (share, off) = nearest(ends, axis);
+    if !(share > 0.0 && share < 1.0 && is_near(off, reach)) {
+        return None;
+    }
+    let along = ends[1] - ends[0];
+    let mut out = Vec3A::ZERO;
+    for t in surface.fan(i) {
+        let vertices = surface.triangles[*t as usize];
+        let Some(opposite) = vertices.contains(&k).then(|| vertices.iter().find(|v| **v != i && **v != k)).flatten()
+        else {
+            continue;
+        };
+        let side = x[*opposite as usize] - ends[0];
+        let inwards = side - along * (side.dot(along) / along.length_squared());
+        if off.dot(inwards) > VALLEY * off.length() * inwards.length() {
+            return None;
+        }
+        out += normal(x, vertices).normalize_or_zero();
+    }
+    let site = Site { vertices: [i, k, i], weights: [1.0 - share, share, 0.0] };
+    (off.dot(out) > 0.0).then_some(Feature { key: (site.vertices, 0), site })
+}
+
+fn is_near(off: Vec3A, reach: f32) -> bool {
+    (MIN_DISTANCE..=reach).contains(&off.length())
+}
+
+fn normal(x: &[Vec3A], vertices: [u32; 3]) -> Vec3A {
+    let [p, q, r] = vertices.map(|i| x[i as usize]);
+    (q - p).cross(r - p)
+}
+
+/// The point of the edge from `p` to `q` nearest to the segment from `a` to `b`: its share of the
+/// edge, and the nearest point of the segment from it (Ericson 2005, "Real-Time Collision
+/// Detection", 5.1.9). Of parallel ones the middle of what is beside each other.
+fn nearest([p, q]: [Vec3A; 2], [a, b]: [Vec3A; 2]) -> (f32, Vec3A) {
+    let (u, v, r) = (q - p, b - a, p - a);
+    let (uu, vv, uv) = (u.length_squared(), v.length_squared(), u.dot(v));
+    let (c, f) = (u.dot(r), v.dot(r));
+    let of_end = |other: f32| ((uv * other - c) / uu.max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+    let span = uu * vv - uv * uv;
+    let mut share = if span > PARALLEL * uu * vv {
+        ((uv * f - c * vv) / span).clamp(0.0, 1.0)
+    } else {
+        0.5 * (of_end(0.0) + of_end(1.0))
+    };
+    let mut other = if vv > 0.0 { (uv * share + f) / vv } else { 0.0 };
+    if !(0.0..=1.0).contains(&other) || vv == 0.0 {
+        other = other.clamp(0.0, 1.0);
+        share = of_end(other);
+    }
+    (share, a + other * v - (p + share * u))
+}
