@@ -33,6 +33,7 @@ mod isosurface;
 pub mod mesher;
 mod quality;
 mod repair;
+mod segments;
 #[cfg(test)]
 mod shapes;
 mod skin;
@@ -50,6 +51,7 @@ pub use isosurface::isosurface;
 pub use mesher::{LatticeMesher, Mesher, TetgenMesher};
 pub use quality::TetQuality;
 pub use repair::{RepairReport, repair};
+pub use segments::nearest_of_segments;
 pub use skin::Skin;
 pub use smooth::taubin;
 pub use tet_mesh::{CutAway, TetMesh};

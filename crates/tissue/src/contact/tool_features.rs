@@ -14,12 +14,10 @@
 use super::site::Site;
 use crate::body::surface::{Surface, foot};
 use glam::Vec3A;
+use trocar_geometry::nearest_of_segments;
 
 /// Distance of a point of the axis from the surface below which it has no direction (m).
 const MIN_DISTANCE: f32 = 1e-6;
-
-/// Squared sine of the angle below which an edge and the axis are parallel.
-const PARALLEL: f32 = 1e-6;
 
 /// Sine of the greatest angle by which the axis is towards a triangle of an edge.
 const VALLEY: f32 = 0.5;
@@ -73,7 +71,8 @@ fn of_edge(surface: &Surface, x: &[Vec3A], edge: [u32; 2], axis: [Vec3A; 2], rea
     // The same numbers whichever triangle the edge is of.
     let [i, k] = [edge[0].min(edge[1]), edge[0].max(edge[1])];
     let ends = [x[i as usize], x[k as usize]];
-    let (share, off) = nearest(ends, axis);
+    let [share, other] = nearest_of_segments(ends.map(|p| p.as_dvec3()), axis.map(|p| p.as_dvec3())).map(|s| s as f32);
+    let off = axis[0] + other * (axis[1] - axis[0]) - (ends[0] + share * (ends[1] - ends[0]));
     if !(share > 0.0 && share < 1.0 && is_near(off, reach)) {
         return None;
     }
@@ -103,26 +102,4 @@ fn is_near(off: Vec3A, reach: f32) -> bool {
 fn normal(x: &[Vec3A], vertices: [u32; 3]) -> Vec3A {
     let [p, q, r] = vertices.map(|i| x[i as usize]);
     (q - p).cross(r - p)
-}
-
-/// The point of the edge from `p` to `q` nearest to the segment from `a` to `b`: its share of the
-/// edge, and the nearest point of the segment from it (Ericson 2005, "Real-Time Collision
-/// Detection", 5.1.9). Of parallel ones the middle of what is beside each other.
-fn nearest([p, q]: [Vec3A; 2], [a, b]: [Vec3A; 2]) -> (f32, Vec3A) {
-    let (u, v, r) = (q - p, b - a, p - a);
-    let (uu, vv, uv) = (u.length_squared(), v.length_squared(), u.dot(v));
-    let (c, f) = (u.dot(r), v.dot(r));
-    let of_end = |other: f32| ((uv * other - c) / uu.max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
-    let span = uu * vv - uv * uv;
-    let mut share = if span > PARALLEL * uu * vv {
-        ((uv * f - c * vv) / span).clamp(0.0, 1.0)
-    } else {
-        0.5 * (of_end(0.0) + of_end(1.0))
-    };
-    let mut other = if vv > 0.0 { (uv * share + f) / vv } else { 0.0 };
-    if !(0.0..=1.0).contains(&other) || vv == 0.0 {
-        other = other.clamp(0.0, 1.0);
-        share = of_end(other);
-    }
-    (share, a + other * v - (p + share * u))
 }
