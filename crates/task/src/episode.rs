@@ -290,6 +290,16 @@ impl Episode {
         }
     }
 
+    /// Ends the episode as its policy had ended it with `end`, after the same actions; ends of the
+    /// simulation come from the actions themselves.
+    pub fn end_again(&mut self, end: &End) {
+        match end {
+            End::PolicyError { why } => self.fail(why),
+            End::Passed | End::Finished => self.finish(),
+            End::TimeOut | End::RcmAbort { .. } | End::Diverged { .. } | End::Aborted { .. } => {}
+        }
+    }
+
     /// What a policy sees now.
     pub fn observe(&self) -> Observation {
         Observation::of(&self.cell.observe(), self.cell.time(), self.progress())

@@ -41,7 +41,7 @@ pub use replay::{EpisodeFile, Header, Verdict, scene_hash};
 pub use run::{CHANNELS_FILE, EPISODE_FILE, EpisodeResult, Kept, RESULT_FILE, Recording, TimedEvent, run, run_watched};
 pub use specimen::specimen_hash;
 pub use stages::{Progress, StageProgress, Tracker};
-pub use storage::{ChannelsInfo, read_channels, write_channels};
+pub use storage::{ChannelsInfo, Column, read_channels, write_channels};
 pub use summary::{ArmSummary, LOADED_N, Summary};
 pub use supply::{OneSpecimen, SpecimenSupply};
 pub use sweep::{GateRange, Sweep, SweepRow, sweep};

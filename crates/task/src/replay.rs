@@ -328,8 +328,11 @@ impl EpisodeFile {
                 return Ok(differs(Some(number), said));
             }
         }
-        let by_policy = matches!(header.end, Some(End::PolicyError { .. } | End::Finished));
-        if !by_policy && header.end.as_ref() != episode.end() {
+        // What the policy ended is not in the actions.
+        if let Some(end) = &header.end {
+            episode.end_again(end);
+        }
+        if header.end.as_ref() != episode.end() {
             let name = |end: Option<&End>| end.map_or("no end", End::name);
             let said = format!("it ends with {}, not {}", name(episode.end()), name(header.end.as_ref()));
             return Ok(differs(Some(self.steps.len()), said));

@@ -1,7 +1,7 @@
 //! One policy through one episode, kept as a file of actions, channels and figures.
 
 use crate::replay::{EpisodeFile, Header};
-use crate::storage::{ChannelsInfo, write_channels};
+use crate::storage::{ChannelsInfo, Column, write_channels};
 use crate::{Channels, Episode, Error, Policy, Result, Step, Summary};
 use serde::Serialize;
 use std::path::Path;
@@ -23,6 +23,8 @@ pub struct Recording {
     pub info: ChannelsInfo,
     /// The rows.
     pub channels: Vec<Channels>,
+    /// What is kept beside the rows, none at first.
+    pub beside: Vec<Column>,
     /// What happened, with times (s).
     pub events: Vec<(f64, CellEvent)>,
     /// The figures.
@@ -82,6 +84,7 @@ impl Kept {
             file: EpisodeFile { header: self.header, steps: self.steps },
             info,
             channels: episode.rows().to_vec(),
+            beside: Vec::new(),
             events: episode.events().to_vec(),
             summary: episode.summary(),
         })
@@ -209,7 +212,7 @@ impl Recording {
     /// A file that cannot be written.
     pub fn write_into(&self, folder: &Path) -> Result<()> {
         self.file.write(&folder.join(EPISODE_FILE))?;
-        write_channels(&folder.join(CHANNELS_FILE), &self.info, &self.channels)?;
+        write_channels(&folder.join(CHANNELS_FILE), &self.info, &self.channels, &self.beside)?;
         let path = folder.join(RESULT_FILE);
         let invalid = |e: serde_json::Error| Error::Invalid { path: path.clone(), reason: format!("{e}") };
         let text = serde_json::to_vec_pretty(&self.result()).map_err(invalid)?;

@@ -97,12 +97,22 @@ impl ChannelsInfo {
     }
 }
 
-/// Writes rows to `path`, whole or not at all.
+/// A column beside the channels, with a number a row: what is known of an episode and no part of it.
+/// Readers of channels pass over it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// Its name, which no channel has.
+    pub name: String,
+    /// Its numbers.
+    pub values: Vec<f64>,
+}
+
+/// Writes rows to `path`, and the columns `beside` them, whole or not at all.
 ///
 /// # Errors
-/// When the file cannot be written.
-pub fn write_channels(path: &Path, info: &ChannelsInfo, rows: &[Channels]) -> Result<()> {
-    let bytes = encode(info, rows).map_err(|reason| Error::Invalid { path: path.to_owned(), reason })?;
+/// When the file cannot be written; a column with the name of another or with too few numbers.
+pub fn write_channels(path: &Path, info: &ChannelsInfo, rows: &[Channels], beside: &[Column]) -> Result<()> {
+    let bytes = encode(info, rows, beside).map_err(|reason| Error::Invalid { path: path.to_owned(), reason })?;
     write_whole(path, &bytes)
 }
 
@@ -115,11 +125,18 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     std::fs::rename(&beside, path).map_err(io)
 }
 
-fn encode(info: &ChannelsInfo, rows: &[Channels]) -> std::result::Result<Vec<u8>, String> {
+fn encode(info: &ChannelsInfo, rows: &[Channels], beside: &[Column]) -> std::result::Result<Vec<u8>, String> {
     let failed = |e: parquet::errors::ParquetError| format!("cannot be written: {e}");
     let measures = info.program().map_err(|e| e.to_string())?.measures;
     let mut names = Channels::names();
     names.extend(measures.iter().map(ToString::to_string));
+    for column in beside {
+        let (name, count) = (&column.name, column.values.len());
+        if names.contains(name) || count != rows.len() {
+            return Err(format!("column '{name}' with {count} numbers does not fit beside {} rows", rows.len()));
+        }
+        names.push(name.clone());
+    }
     let field = |name: &String| {
         let made = Type::primitive_type_builder(name, Physical::DOUBLE).with_repetition(Repetition::REQUIRED).build();
         made.map(Arc::new)
@@ -147,9 +164,12 @@ fn encode(info: &ChannelsInfo, rows: &[Channels]) -> std::result::Result<Vec<u8>
         .build();
     let mut writer = SerializedFileWriter::new(Vec::new(), Arc::new(schema), Arc::new(properties)).map_err(failed)?;
     let mut group = writer.next_row_group().map_err(failed)?;
-    let mut k = 0;
+    let mut k = 0_usize;
     while let Some(mut column) = group.next_column().map_err(failed)? {
-        let values: Vec<f64> = table.iter().map(|row| row[k]).collect();
+        let values: Vec<f64> = match k.checked_sub(names.len() - beside.len()) {
+            Some(k) => beside[k].values.clone(),
+            None => table.iter().map(|row| row[k]).collect(),
+        };
         column.typed::<DoubleType>().write_batch(&values, None, None).map_err(failed)?;
         column.close().map_err(failed)?;
         k += 1;

@@ -9,7 +9,7 @@ use trocar_cell::{Action, CellEvent, Setpoint};
 use trocar_scene::{Distribution, Factor, Scene, TaskName};
 use trocar_specimen::Specimen;
 use trocar_task::{
-    Channels, End, Episode, EpisodeFile, GateRange, Policy, Recording, STATE_SIZE, policy, read_channels, run, sweep,
+    Channels, Column, End, Episode, EpisodeFile, GateRange, Policy, Recording, STATE_SIZE, policy, read_channels, run, sweep,
 };
 use trocar_testing::tube::{ONE_END, resection, two_tubes};
 
@@ -54,6 +54,17 @@ fn the_scripted_baseline_passes_and_its_files_tell_all_of_it() {
         }
         std::fs::write(&path, &good[..at]).unwrap();
         assert!(read_channels(&path).is_err(), "cut at {at}");
+    }
+
+    // What is kept beside the channels has a number a row and a name of its own.
+    let mut more = recording.clone();
+    let column = |name: &str, count: usize| Column { name: name.to_owned(), values: vec![1.0; count] };
+    more.beside = vec![column("left_actor", recording.channels.len())];
+    more.write_into(folder.path()).unwrap();
+    assert_eq!(read_channels(&path).unwrap().1, recording.channels);
+    for wrong in [column("time_s", recording.channels.len()), column("left_actor", 1)] {
+        more.beside = vec![wrong];
+        assert!(more.write_into(folder.path()).is_err());
     }
 
     // Replay: the same bits, on two threads.

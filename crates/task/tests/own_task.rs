@@ -2,8 +2,9 @@
 //! stored and swept, an abort ends it, and a replay needs nothing but the episode file.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+use trocar_cell::Action;
 use trocar_scene::{Abort, Scene, ScriptStep, Side, Stage, StageOrder, TaskName, View};
-use trocar_task::{End, Episode, EpisodeFile, GateRange, Recording, policy, prompt, read_channels, run, sweep};
+use trocar_task::{End, Episode, EpisodeFile, GateRange, Policy, Recording, policy, prompt, read_channels, run, sweep};
 use trocar_testing::tube::{ONE_END, resection, two_tubes};
 
 fn stage(name: &str, when: &str) -> Stage {
@@ -154,4 +155,45 @@ fn wide_organs_are_pinched() {
     let recording = run(&mut episode, scripted.as_mut(), 1, &mut |_| true).unwrap();
     assert!(recording.summary.passed, "{:?}", recording.summary.why);
     assert!(recording.channels.iter().all(|row| row.task.disabled_contacts == 0.0));
+}
+
+/// Holds the arms where they are for some periods; then it has nothing left to do.
+struct Brief(u32);
+
+impl Policy for Brief {
+    fn name(&self) -> &'static str {
+        "brief"
+    }
+
+    fn begin(&mut self, _: &Episode, _: u64) -> trocar_task::Result<()> {
+        Ok(())
+    }
+
+    fn act(&mut self, episode: &Episode) -> trocar_task::Result<Vec<Action>> {
+        let still = Action::targets(&episode.cell().observe().iter().map(|arm| arm.commanded).collect::<Vec<_>>());
+        let left = self.0;
+        self.0 = left.saturating_sub(1);
+        Ok(if left > 0 { vec![still] } else { Vec::new() })
+    }
+
+    fn finished(&self) -> bool {
+        self.0 == 0
+    }
+}
+
+#[test]
+fn an_end_that_the_policy_chose_is_replayed_too() {
+    let mut scene = pull_aside();
+    (scene.task.stages, scene.task.stop_when_passed) = (vec![stage("begin", "lift_mm < 100")], false);
+    (scene.task.constants, scene.task.script) = Default::default();
+    let mut episode = Episode::new(&scene, &two_tubes(ONE_END, 3e-3), 1).unwrap();
+    let recording = run(&mut episode, &mut Brief(5), 1, &mut |_| true).unwrap();
+    assert_eq!((recording.file.steps.len(), &recording.file.header.end), (5, &Some(End::Passed)));
+    let verify = |file: &EpisodeFile| file.verify(&scene, &two_tubes(ONE_END, 3e-3), 1, &mut || true).unwrap();
+    let verdict = verify(&recording.file);
+    assert!(verdict.same, "{verdict:?}");
+    // Another end is found.
+    let mut other = recording.file.clone();
+    other.header.end = Some(End::Finished);
+    assert_eq!(verify(&other).said, "it ends with passed, not finished");
 }
