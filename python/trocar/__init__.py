@@ -5,6 +5,7 @@
 >>> envs = gym.make_vec("trocar/GraspLift-v0", num_envs=16)
 
 - `trocar.envs`: the environments and their options.
+- `trocar.view`: an environment in the browser while it is stepped.
 - `trocar.datasets`: demonstrations as LeRobot and robomimic files.
 - `trocar.export`: recorded episodes as datasets, rendered after the fact.
 - `trocar.teleop`: the instruments in the hands of a device, with force.
@@ -16,10 +17,21 @@
 import gymnasium as _gymnasium
 
 from ._native import __version__, scenes
+from ._view import Viewer, view
 from .envs import TrocarEnv, TrocarVectorEnv
 from .policy import Policy, policies
 
-__all__ = ["TASKS", "Policy", "TrocarEnv", "TrocarVectorEnv", "__version__", "policies", "scenes"]
+__all__ = [
+    "TASKS",
+    "Policy",
+    "TrocarEnv",
+    "TrocarVectorEnv",
+    "Viewer",
+    "__version__",
+    "policies",
+    "scenes",
+    "view",
+]
 
 #: Environment ids and their tasks.
 TASKS = {

@@ -105,6 +105,23 @@ class Cells:
     def restore(self, k: int, saved: State, arrays: Arrays) -> None:
         """ValueError, with nothing changed, for a state of another scene, task or specimen."""
 
+class View:
+    """The live view of cell `k`: told of every step, reset and restored state. Ends with `Cells`.
+
+    ValueError for a port that is in use.
+    """
+
+    def __init__(self, cells: Cells, k: int, *, name: str, port: int = 0) -> None: ...
+    @property
+    def url(self) -> str: ...
+    @property
+    def wire(self) -> str: ...
+    @property
+    def page(self) -> bool: ...
+    @property
+    def closed(self) -> bool: ...
+    def close(self) -> None: ...
+
 class Controller:
     """A built-in controller."""
 

@@ -5,6 +5,7 @@ use crate::frames::Rows;
 use crate::pictures::Eyes;
 use crate::prepare;
 use crate::progress::Signals;
+use crate::view::Viewers;
 use numpy::{PyArray1, PyArray3, PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -29,6 +30,7 @@ pub struct State(EpisodeState);
 pub struct Cells {
     pub(crate) episodes: Vec<Episode>,
     pub(crate) eyes: Eyes,
+    pub(crate) viewers: Viewers,
     specimens: SpecimenCache,
     bounds: Bounds,
     pub(crate) pool: rayon::ThreadPool,
@@ -136,7 +138,8 @@ impl Cells {
             let prompt = trocar_task::prompt(&scene);
             let eyes = Eyes::new(count, sensor_noise);
             let (task_name, process) = (scene.task.name.name().to_owned(), std::process::id());
-            Ok(Self { episodes, eyes, specimens, bounds, pool, task_name, prompt, steps, process })
+            let viewers = Viewers::default();
+            Ok(Self { episodes, eyes, viewers, specimens, bounds, pool, task_name, prompt, steps, process })
         })
     }
 
@@ -266,7 +269,8 @@ impl Cells {
             Some(seed) => place.episode.reset(*seed).map(|_| place.write(0.0)),
             None => Ok(()),
         };
-        self.each(py, &arrays, &wanted, begin)
+        self.each(py, &arrays, &wanted, begin)?;
+        self.viewers.see(py, &self.episodes, |k| wanted[k].map(|_| true))
     }
 
     /// Does one control period in every cell that `active` says, by its row of `actions`. An action
@@ -295,7 +299,8 @@ impl Cells {
             Some(action) => place.step(action),
             None => Ok(()),
         };
-        self.each(py, &arrays, &told, go)
+        self.each(py, &arrays, &told, go)?;
+        self.viewers.see(py, &self.episodes, |k| told[k].as_ref().map(|_| false))
     }
 
     /// Why the episode in cell `k` ended; None while it goes on.
@@ -337,7 +342,8 @@ impl Cells {
             Some(saved) => place.episode.restore(&saved.0).map(|()| place.write(0.0)),
             None => Ok(()),
         };
-        self.each(py, &arrays, &which, put)
+        self.each(py, &arrays, &which, put)?;
+        self.viewers.see(py, &self.episodes, |j| (j == k).then_some(true))
     }
 }
 

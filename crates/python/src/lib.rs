@@ -16,6 +16,7 @@ mod policy;
 mod prepare;
 mod progress;
 mod recorded;
+mod view;
 
 use pyo3::prelude::*;
 
@@ -30,6 +31,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<campaign::Stop>()?;
     module.add_class::<campaign::Worker>()?;
     module.add_class::<recorded::Recorded>()?;
+    module.add_class::<view::View>()?;
     module.add_function(wrap_pyfunction!(pictures::cameras, module)?)?;
     module.add_function(wrap_pyfunction!(policy::policies, module)?)?;
     module.add_function(wrap_pyfunction!(prepare::scenes, module)?)?;

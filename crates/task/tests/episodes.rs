@@ -9,7 +9,8 @@ use trocar_cell::{Action, CellEvent, Setpoint};
 use trocar_scene::{Distribution, Factor, Scene, TaskName};
 use trocar_specimen::Specimen;
 use trocar_task::{
-    Channels, Column, End, Episode, EpisodeFile, GateRange, Policy, Recording, STATE_SIZE, policy, read_channels, run, sweep,
+    Channels, Column, End, Episode, EpisodeFile, GateRange, Policy, Recording, STATE_SIZE, policy, read_channels, run,
+    sweep,
 };
 use trocar_testing::tube::{ONE_END, resection, two_tubes};
 

@@ -58,6 +58,8 @@ type Ranges = [[f32; 2]; 2];
 
 /// What connects clients and simulation.
 pub(crate) struct Hub {
+    /// Why clients may drive nothing, if they only watch.
+    watched: Option<&'static str>,
     people: Mutex<People>,
     pub inbox: Inbox,
     commands: Mutex<[Option<Arrived>; 2]>,
@@ -67,8 +69,10 @@ pub(crate) struct Hub {
 }
 
 impl Hub {
+    /// Of clients that may drive what they have the seats of.
     pub fn new() -> Self {
         Self {
+            watched: None,
             people: Mutex::default(),
             inbox: Inbox::default(),
             commands: Mutex::default(),
@@ -76,6 +80,11 @@ impl Hub {
             ranges: Mutex::new([[1.0, 1.5], [0.0, 300.0]]),
             start: Instant::now(),
         }
+    }
+
+    /// Of clients that only watch, and are told `why`.
+    pub fn watched(why: &'static str) -> Self {
+        Self { watched: Some(why), ..Self::new() }
     }
 
     /// Wall time since the server began (s).
@@ -95,7 +104,7 @@ impl Hub {
         let seats = seats_of(&people.seats);
         client.reply(Outgoing::text(&hello(client.id, &seats)));
         for known in [&people.status, &people.scene, &people.organs].into_iter().flatten() {
-            client.reply(known.clone());
+            client.tell(known);
         }
         if let Some(frame) = &people.frame {
             client.offer(frame, Instant::now());
@@ -145,14 +154,14 @@ impl Hub {
     /// Sends a message to all.
     pub fn tell(&self, value: &Value) {
         let message = Outgoing::text(value);
-        lock(&self.people).clients.values().for_each(|c| c.reply(message.clone()));
+        lock(&self.people).clients.values().for_each(|c| c.tell(&message));
     }
 
     /// Sends the status to all, and to whoever comes later.
     pub fn tell_status(&self, value: &Value) {
         let message = Outgoing::text(value);
         let mut people = lock(&self.people);
-        people.clients.values().for_each(|c| c.reply(message.clone()));
+        people.clients.values().for_each(|c| c.tell(&message));
         people.status = Some(message);
     }
 
@@ -163,7 +172,7 @@ impl Hub {
         let (scene, organs) = (scene.map(message), organs.map(message));
         for client in people.clients.values() {
             client.forget_frame();
-            [&scene, &organs].into_iter().flatten().for_each(|m| client.reply(m.clone()));
+            [&scene, &organs].into_iter().flatten().for_each(|m| client.tell(m));
         }
         people.frame = None;
         if scene.is_some() {
@@ -186,6 +195,19 @@ impl Hub {
     pub fn wants_frame(&self) -> bool {
         let now = Instant::now();
         lock(&self.people).clients.values().any(|c| c.wants_now(now))
+    }
+
+    /// Whether any client gets frames.
+    pub fn shows_frames(&self) -> bool {
+        lock(&self.people).clients.values().any(|c| c.wants().frames_hz > 0.0)
+    }
+
+    /// Offers the last frame again: a client came, or wants other things in it.
+    pub fn offer_again(&self) {
+        let last = lock(&self.people).frame.clone();
+        if let Some(frame) = last {
+            self.offer(&frame);
+        }
     }
 
     /// What frames have to have.
@@ -228,6 +250,9 @@ impl Hub {
 
     /// Whether a client may do what needs `seat`.
     pub fn check(&self, id: ClientId, seat: Seat) -> Result<(), Mistake> {
+        if let Some(why) = self.watched {
+            return Err(Mistake("seat", why.to_owned()));
+        }
         match lock(&self.people).seats[seat as usize] {
             Some(own) if own == id => Ok(()),
             Some(other) => Err(Mistake("seat", taken(seat, other))),
@@ -243,6 +268,9 @@ impl Hub {
 
     /// Gives and takes seats: all or none of those that are taken.
     pub fn sit(&self, id: ClientId, take: &[Seat], give: &[Seat]) -> Result<(), Mistake> {
+        if let Some(why) = self.watched.filter(|_| !take.is_empty()) {
+            return Err(Mistake("seat", why.to_owned()));
+        }
         let mut people = lock(&self.people);
         for seat in take {
             if let Some(other) = people.seats[*seat as usize].filter(|own| *own != id) {

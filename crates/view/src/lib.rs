@@ -3,13 +3,16 @@
 //! A [`Server`] simulates in one thread, makes frames in another, and serves the page and the wire
 //! (docs/guides/view-wire.md) on a port of this machine. Each client has a slot for one frame: a
 //! slow one misses frames, and the simulation never waits. What clients send changes nothing but
-//! through the actions of the episode, so that what an operator does is an episode file.
+//! through the actions of the episode, so that what an operator does is an episode file. A
+//! [`Follower`] shows an episode that another program steps, to clients that only watch.
 
 mod arm_columns;
 pub mod client;
 mod encode;
 mod error;
+mod follow;
 mod frame;
+mod front;
 mod haptic;
 mod http;
 mod hub;
@@ -23,6 +26,7 @@ mod page;
 mod picture;
 mod policy;
 mod protocol;
+mod readings;
 mod record;
 mod server;
 mod session;
@@ -35,6 +39,7 @@ mod table;
 mod values;
 
 pub use error::{Error, Result};
+pub use follow::Follower;
 pub use page::build_page;
 pub use server::{Options, Server};
 pub use source::{Building, Source};

@@ -1,16 +1,23 @@
 //! Measurements for devices, in the words of the Collaborative Robotics Toolkit (CRTK).
 
 use crate::error::Result;
-use crate::operator::arm_of;
+use crate::operator::{Shown, arm_of};
 use crate::outbox::Outgoing;
+use crate::protocol::ArmName;
 use crate::shapes::pose_numbers;
-use crate::show::Show;
 use serde_json::{Map, json};
 use trocar_robot::wrench::ForceKind;
+use trocar_task::Episode;
 
-/// The message `measured`.
-pub(crate) fn message(show: &Show) -> Result<Outgoing> {
-    let cell = show.episode.cell();
+/// The message `measured`, after `step` periods of `episode`. `shown` has the newest command of an
+/// arm that was applied, `actor` who moves it.
+pub(crate) fn message(
+    episode: &Episode,
+    step: usize,
+    shown: impl Fn(ArmName) -> Option<Shown>,
+    actor: impl Fn(ArmName) -> &'static str,
+) -> Result<Outgoing> {
+    let cell = episode.cell();
     let mut arms = Map::new();
     for arm in cell.observe() {
         let name = arm.side.name();
@@ -18,16 +25,14 @@ pub(crate) fn message(show: &Show) -> Result<Outgoing> {
         let wrench = arm.force.wrench;
         let force: Vec<f64> = wrench.force.to_array().into_iter().chain(wrench.torque.to_array()).collect();
         let kind = if arm.force.kind == ForceKind::Constraint { "constraint" } else { "contact" };
-        let shown = show.live.as_ref().and_then(|live| live.operators.shown(arm_of(arm.side)));
         let said = json!({
             "measured_cp": pose_numbers(&arm.tip), "setpoint_cp": pose_numbers(&commanded),
             "measured_js": arm.measured.0[..4], "setpoint_js": arm.commanded.0[..4],
             "jaw_measured_js": arm.measured.jaw(), "jaw_setpoint_js": arm.commanded.jaw(),
-            "measured_cf": force, "force_kind": kind, "seq": shown.map(|s| s.seq),
-            "actor": show.actor(arm_of(arm.side)),
+            "measured_cf": force, "force_kind": kind, "seq": shown(arm_of(arm.side)).map(|s| s.seq),
+            "actor": actor(arm_of(arm.side)),
         });
         arms.insert(name.to_owned(), said);
     }
-    let step = show.at;
-    Ok(Outgoing::text(&json!({"type": "measured", "step": step, "time_s": show.episode.time(), "arms": arms})))
+    Ok(Outgoing::text(&json!({"type": "measured", "step": step, "time_s": episode.time(), "arms": arms})))
 }

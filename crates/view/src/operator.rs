@@ -10,16 +10,16 @@ use trocar_cell::{Cell, Setpoint};
 use trocar_core::Pose;
 use trocar_scene::{Scene, Side};
 
-/// Who moves an arm.
+/// Who moves an arm, with its number in the column of files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Actor {
     /// The policy.
     #[default]
-    Policy,
+    Policy = 0,
     /// The operator, by a command that lives.
-    Operator,
+    Operator = 1,
     /// Nobody: the operator has the arm, but no command lives.
-    Hold,
+    Hold = 2,
 }
 
 impl Actor {

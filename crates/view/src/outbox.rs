@@ -10,8 +10,9 @@ use std::time::{Duration, Instant};
 
 /// Replies that wait for a client before it is cut off as too slow.
 const MAX_REPLIES: usize = 256;
-/// Bytes of them.
-const MAX_REPLY_BYTES: usize = 256 << 20;
+/// Bytes of those that were made for it alone, beside the newest of them.
+const MAX_REPLY_BYTES: usize = 8 << 20;
+
 /// A message as it is sent.
 #[derive(Clone, Debug)]
 pub(crate) enum Outgoing {
@@ -37,7 +38,8 @@ impl Outgoing {
 /// What waits for a client: replies in order, and the newest frame.
 #[derive(Default)]
 struct Outbox {
-    replies: VecDeque<Outgoing>,
+    /// What waits, with the bytes that it takes beside what all clients share.
+    replies: VecDeque<(Outgoing, usize)>,
     bytes: usize,
     frame: Option<Arc<Frame>>,
     /// Frames that were replaced before they were sent.
@@ -81,13 +83,27 @@ impl Client {
         Self { id, outbox: Mutex::default(), news: Condvar::new() }
     }
 
-    /// Sends a reply. A client that lets too many wait is cut off.
+    /// Sends a reply. A client that lets too many wait is cut off, and what waited is let go.
     pub fn reply(&self, message: Outgoing) {
+        let bytes = message.len();
+        self.push(message, bytes);
+    }
+
+    /// The same with a message that all clients share.
+    pub fn tell(&self, message: &Outgoing) {
+        self.push(message.clone(), 0);
+    }
+
+    fn push(&self, message: Outgoing, bytes: usize) {
         let mut outbox = lock(&self.outbox);
-        outbox.bytes += message.len();
-        outbox.replies.push_back(message);
-        if outbox.replies.len() > MAX_REPLIES || outbox.bytes > MAX_REPLY_BYTES {
+        if outbox.replies.len() >= MAX_REPLIES || outbox.bytes > MAX_REPLY_BYTES {
             outbox.closed = true;
+        }
+        if outbox.closed {
+            (outbox.replies, outbox.bytes, outbox.frame) = (VecDeque::new(), 0, None);
+        } else {
+            outbox.bytes += bytes;
+            outbox.replies.push_back((message, bytes));
         }
         drop(outbox);
         self.news.notify_one();
@@ -97,7 +113,7 @@ impl Client {
     /// for the client's rate waits there: it may be the last for a while.
     pub fn offer(&self, frame: &Arc<Frame>, now: Instant) {
         let mut outbox = lock(&self.outbox);
-        if outbox.wants.frames_hz <= 0.0 {
+        if outbox.wants.frames_hz <= 0.0 || outbox.closed {
             return;
         }
         let late = outbox.frame_due() <= Some(now);
@@ -122,8 +138,8 @@ impl Client {
             if outbox.closed {
                 return Next::Closed;
             }
-            if let Some(reply) = outbox.replies.pop_front() {
-                outbox.bytes -= reply.len();
+            if let Some((reply, bytes)) = outbox.replies.pop_front() {
+                outbox.bytes -= bytes;
                 return Next::Reply(reply);
             }
             let now = Instant::now();

@@ -10,7 +10,7 @@ use crate::show::Show;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use trocar_specimen::StagedFolder;
-use trocar_task::RESULT_FILE;
+use trocar_task::{Column, RESULT_FILE};
 use trocar_workflow::{SURFACES_FILE, SurfaceWatch};
 
 /// What the operator sent, one JSON object a line.
@@ -61,7 +61,8 @@ impl Recorder {
         if by_operator && live.policy_name != OPERATOR {
             kept.rename(&format!("{}+{OPERATOR}", live.policy_name));
         }
-        let recording = kept.finish(&show.episode)?;
+        let mut recording = kept.finish(&show.episode)?;
+        recording.beside = [ArmName::Left, ArmName::Right].map(|arm| actor_column(arm, &live.actors)).to_vec();
         let passed = recording.summary.passed;
         let staged = StagedFolder::create(&folder, RESULT_FILE).map_err(trocar_workflow::Error::from)?;
         recording.write_into(staged.path())?;
@@ -82,6 +83,12 @@ impl Recorder {
         staged.commit().map_err(trocar_workflow::Error::from)?;
         Ok((folder, passed))
     }
+}
+
+/// Who moved an arm in each period, as numbers: 0 the policy, 1 the operator, 2 nobody.
+fn actor_column(arm: ArmName, actors: &[[Actor; 2]]) -> Column {
+    let values = actors.iter().map(|both| f64::from(both[arm as usize] as u8)).collect();
+    Column { name: format!("{}_actor", arm.name()), values }
 }
 
 /// A raw input.

@@ -5,21 +5,21 @@ use crate::encode::Encoder;
 use crate::error::Result;
 use crate::haptic::haptic;
 use crate::hub::Hub;
-use crate::operator::{Actor, Operators, arm_of};
+use crate::operator::{Actor, Operators};
 use crate::pace::Pace;
 use crate::policy;
 use crate::protocol::ArmName;
-use crate::shapes::{Topology, fresh, scene_message};
+use crate::readings::{self, Readings};
 use crate::snapshot::Taker;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use trocar_cell::{Action, Cell, CellEvent};
 use trocar_scene::Scene;
-use trocar_sensors::{CameraRig, DrawnCell};
-use trocar_task::{Channels, Episode, EpisodeFile, EpisodeState, Kept, Policy, Step};
+use trocar_sensors::CameraRig;
+use trocar_task::{End, Episode, EpisodeFile, EpisodeState, Kept, Policy, Step};
 use trocar_workflow::SurfaceWatch;
 
 /// Time between states that are kept (s).
@@ -32,6 +32,8 @@ pub(crate) struct Live {
     chunk: VecDeque<Action>,
     pub operators: Operators,
     pub kept: Kept,
+    /// The end that the policy chose or that its failure was: no action leads there.
+    ended: Option<End>,
     /// Who moved each arm (left, right) in each period.
     pub actors: Vec<[Actor; 2]>,
     /// What pictures of it are made of, where it may be kept.
@@ -52,9 +54,7 @@ pub(crate) struct Show {
     /// Periods done where the episode stands.
     pub at: usize,
     keyframes: Vec<(usize, EpisodeState)>,
-    /// The last row and the stages, as frames have them.
-    row: Vec<f32>,
-    stages: Vec<f32>,
+    readings: Readings,
     pub lift: bool,
 }
 
@@ -79,15 +79,6 @@ impl Around<'_> {
     }
 }
 
-fn taker(episode: &Episode) -> Result<Taker> {
-    let cell = episode.cell();
-    let drawn = DrawnCell::new(episode.arranged_scene(), episode.specimen(), cell)?;
-    let number = fresh();
-    let topology = Topology::of(number, cell, &drawn);
-    let message = scene_message(number, episode, &drawn)?;
-    Ok(Taker::new(drawn, topology, message))
-}
-
 impl Show {
     /// Of an episode that stands at its start; `file` has what is done in it.
     ///
@@ -95,7 +86,7 @@ impl Show {
     /// Shapes that cannot be read.
     pub fn new(episode: Episode, file: Option<EpisodeFile>, lift: bool) -> Result<Self> {
         let mut made = Self {
-            taker: taker(&episode)?,
+            taker: Taker::of(&episode)?,
             drawn: episode.arranged_scene().clone(),
             episode,
             live: None,
@@ -103,8 +94,7 @@ impl Show {
             differs_s: None,
             at: 0,
             keyframes: Vec::new(),
-            row: Vec::new(),
-            stages: Vec::new(),
+            readings: Readings::default(),
             lift,
         };
         made.begin();
@@ -119,7 +109,7 @@ impl Show {
     fn begin(&mut self) {
         self.at = 0;
         self.keyframes = vec![(0, self.episode.save())];
-        self.note_row();
+        self.readings.note(&self.episode);
     }
 
     /// Begins the live episode of `seed` by the policy of that name; `records` tells whether it may be
@@ -144,7 +134,7 @@ impl Show {
         let arranged = self.episode.arranged_scene();
         if !CameraRig::shows_same(arranged, &self.drawn) {
             self.drawn = arranged.clone();
-            self.taker = taker(&self.episode)?;
+            self.taker = Taker::of(&self.episode)?;
         }
         made.begin(&self.episode, seed)?;
         let kept = Kept::begin(&self.episode, made.name())?;
@@ -152,7 +142,7 @@ impl Show {
         let mut surfaces = SurfaceWatch::new(records);
         surfaces.see(&self.episode, None);
         let (policy_name, actors) = (name.to_owned(), Vec::new());
-        self.live = Some(Live { policy: made, policy_name, chunk, operators, kept, actors, surfaces });
+        self.live = Some(Live { policy: made, policy_name, chunk, operators, kept, ended: None, actors, surfaces });
         self.begin();
         Ok(())
     }
@@ -204,9 +194,26 @@ impl Show {
         if let Some((at, state)) = kept.filter(|(at, _)| self.at > to || *at > self.at) {
             self.episode.restore(state)?;
             self.at = *at;
-            self.note_row();
+            self.end_again();
+            self.readings.note(&self.episode);
         }
         Ok(())
+    }
+
+    /// At the head the episode ends as it had ended, if its policy or a failure ended it.
+    fn end_again(&mut self) {
+        let of_file = || self.file.as_ref().and_then(|file| file.header.end.as_ref());
+        let end = self.live.as_ref().and_then(|live| live.ended.as_ref()).or_else(of_file).cloned();
+        if let Some(end) = end.filter(|_| !self.in_review()) {
+            self.episode.end_again(&end);
+        }
+    }
+
+    /// Keeps the end that came without an action.
+    fn note_end(&mut self) {
+        if let Some(live) = &mut self.live {
+            live.ended = self.episode.end().cloned();
+        }
     }
 
     /// Who moves an arm.
@@ -215,6 +222,10 @@ impl Show {
             Some(live) if !self.in_review() => live.operators.actor(arm).name(),
             _ => "replay",
         }
+    }
+
+    fn header(&self, step: usize) -> Value {
+        readings::header(&self.episode, step, self.mode(), |arm| self.actor(arm))
     }
 
     /// Does one period, and gives frames of it unless it is `quiet`. Returns what happened; `None`
@@ -231,13 +242,17 @@ impl Show {
             None => self.choose(around.hub, tick)?,
         };
         let Some(action) = action else {
+            self.note_end();
             if !quiet {
                 self.show(around, 0)?;
             }
             return Ok(None);
         };
         let step = self.step(&action, around, quiet)?;
-        let Some(step) = step else { return Ok(None) };
+        let Some(step) = step else {
+            self.note_end();
+            return Ok(None);
+        };
         let hash = self.episode.state_hash();
         match (&recorded, &mut self.live) {
             (Some((_, expected)), _) => {
@@ -253,7 +268,8 @@ impl Show {
             (None, None) => {}
         }
         self.at += 1;
-        self.note_row();
+        self.end_again();
+        self.readings.note(&self.episode);
         let every = (KEYFRAME_S / self.period()).round().max(1.0) as usize;
         if self.at.is_multiple_of(every) && self.keyframes.last().is_none_or(|(at, _)| *at < self.at) {
             self.keyframes.push((self.at, self.episode.save()));
@@ -301,8 +317,8 @@ impl Show {
         let begin = around.pace.due();
         let frame_s = trocar_cell::FRAME;
         let (mut part, mut failed, at) = (0, None, self.at);
-        let head = header(self, self.at);
-        let Self { episode, taker, live, row, stages, .. } = self;
+        let head = self.header(self.at);
+        let Self { episode, taker, live, readings, .. } = self;
         let operators = live.as_ref().map(|l| &l.operators);
         let stepped = episode.step_watched(action, &mut |cell: &mut Cell| {
             part += 1;
@@ -321,7 +337,7 @@ impl Show {
                 header["part"] = json!(part);
                 header["time_s"] = json!(cell.time() + f64::from(part) * frame_s);
                 add_commands(&mut header, operators);
-                match taker.take(cell, around.hub.wants(), header, row, stages) {
+                match taker.take(cell, around.hub.wants(), header, readings) {
                     Ok(snapshot) => around.encoder.give(snapshot),
                     Err(why) => failed = Some(why),
                 }
@@ -351,65 +367,14 @@ impl Show {
             return Ok(());
         }
         let parts = self.episode.cell().frames();
-        let mut header = header(self, self.at.saturating_sub(1));
-        header["step"] = json!(self.at);
+        let mut header = self.header(self.at);
         header["part"] = json!(parts);
         header["time_s"] = json!(self.episode.time());
         add_commands(&mut header, self.live.as_ref().map(|l| &l.operators));
-        let Self { episode, taker, row, stages, .. } = self;
-        around.encoder.give(taker.take(episode.cell(), around.hub.wants(), header, row, stages)?);
+        let Self { episode, taker, readings, .. } = self;
+        around.encoder.give(taker.take(episode.cell(), around.hub.wants(), header, readings)?);
         Ok(())
     }
-
-    fn note_row(&mut self) {
-        self.row.clear();
-        let measures = self.episode.program().measures.len();
-        if let Some(row) = self.episode.rows().last() {
-            self.row.extend(numbers(row, measures).map(|x| x as f32));
-        }
-        let progress = self.episode.progress();
-        self.stages.clear();
-        for stage in &progress.stages {
-            let passed = f32::from(u8::from(stage.passed));
-            self.stages.extend([passed, stage.share as f32, stage.time_s.map_or(-1.0, |t| t as f32)]);
-        }
-    }
-
-    /// Rows of the channels of these names from `from_s` on, with their times; the name that is
-    /// none.
-    pub fn history(&self, names: &[String], from_s: f64) -> std::result::Result<(Vec<f32>, Vec<f32>), String> {
-        let all = crate::shapes::channel_names(&self.episode);
-        let place = |name: &String| all.iter().position(|own| own == name).ok_or_else(|| name.clone());
-        let places: Vec<usize> = names.iter().map(place).collect::<std::result::Result<_, _>>()?;
-        let measures = self.episode.program().measures.len();
-        let (mut times, mut rows) = (Vec::new(), Vec::new());
-        for row in self.episode.rows().iter().filter(|r| r.time_s >= from_s) {
-            let values: Vec<f64> = numbers(row, measures).collect();
-            times.push(row.time_s as f32);
-            rows.extend(places.iter().map(|k| values[*k] as f32));
-        }
-        Ok((times, rows))
-    }
-}
-
-/// Channels, then what the task measures beside.
-fn numbers(row: &Channels, measures: usize) -> impl Iterator<Item = f64> {
-    row.to_row().into_iter().chain(row.measures.into_iter().take(measures))
-}
-
-/// The fields of a frame's header that do not change within a period, of which `step` are done.
-fn header(show: &Show, step: usize) -> Value {
-    let actors: Map<String, Value> = show
-        .episode
-        .cell()
-        .arms()
-        .iter()
-        .map(|(side, _)| (side.name().to_owned(), json!(show.actor(arm_of(*side)))))
-        .collect();
-    json!({
-        "step": step, "parts": show.episode.cell().frames(), "mode": show.mode(),
-        "stage": show.episode.progress().name(), "actors": actors, "value": null,
-    })
 }
 
 fn add_commands(header: &mut Value, operators: Option<&Operators>) {

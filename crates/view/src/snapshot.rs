@@ -4,13 +4,15 @@
 use crate::arm_columns::ARM_COLUMNS;
 use crate::error::Result;
 use crate::hub::Wants;
-use crate::shapes::{Topology, fresh, pose_numbers};
+use crate::readings::Readings;
+use crate::shapes::{Topology, fresh, pose_numbers, scene_message};
 use glam::DVec3;
 use serde_json::Value;
 use std::sync::Arc;
 use std::time::Instant;
 use trocar_cell::Cell;
 use trocar_sensors::DrawnCell;
+use trocar_task::Episode;
 
 /// A copy of an organ.
 #[derive(Clone)]
@@ -52,9 +54,17 @@ pub(crate) struct Taker {
 }
 
 impl Taker {
-    /// For a cell that was drawn as `drawn`.
-    pub fn new(drawn: DrawnCell, topology: Topology, scene: Vec<u8>) -> Self {
-        Self { drawn, topology: Arc::new(topology), scene: Arc::new(scene), organs: Vec::new() }
+    /// For the cell of `episode`, whose scene gets a new number.
+    ///
+    /// # Errors
+    /// Shapes that cannot be read.
+    pub fn of(episode: &Episode) -> Result<Self> {
+        let cell = episode.cell();
+        let drawn = DrawnCell::new(episode.arranged_scene(), episode.specimen(), cell)?;
+        let number = fresh();
+        let topology = Topology::of(number, cell, &drawn);
+        let scene = scene_message(number, episode, &drawn)?;
+        Ok(Self { drawn, topology: Arc::new(topology), scene: Arc::new(scene), organs: Vec::new() })
     }
 
     /// Follows the organs of `cell`. After a cut they have new surfaces.
@@ -75,8 +85,8 @@ impl Taker {
         Ok(())
     }
 
-    /// A snapshot of `cell`; row, stages and header are the caller's.
-    pub fn take(&mut self, cell: &Cell, wants: Wants, header: Value, row: &[f32], stages: &[f32]) -> Result<Snapshot> {
+    /// A snapshot of `cell`; readings and header are the caller's.
+    pub fn take(&mut self, cell: &Cell, wants: Wants, header: Value, readings: &Readings) -> Result<Snapshot> {
         self.follow(cell)?;
         let poses = self.drawn.poses(cell)?;
         let observed = cell.observe();
@@ -93,8 +103,8 @@ impl Taker {
             arm_count: observed.len(),
             contacts: wants.contacts.then(|| self.contacts(cell)),
             held: wants.held.then(|| held(cell, observed.len())),
-            row: row.to_vec(),
-            stages: stages.to_vec(),
+            row: readings.row.clone(),
+            stages: readings.stages.clone(),
             header,
             wants,
             taken: Instant::now(),

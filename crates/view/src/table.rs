@@ -7,6 +7,11 @@ use trocar_task::{EPISODE_FILE, RESULT_FILE};
 /// Most episodes of a table.
 const MOST: usize = 20_000;
 
+/// The message `table` where there is none.
+pub(crate) fn no_episodes(number: Option<i64>) -> Value {
+    json!({"type": "table", "request": number, "kind": "none", "name": "", "episodes": []})
+}
+
 /// Names of the folders in `folder`, in order.
 fn folders(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();

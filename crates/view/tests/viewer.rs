@@ -3,6 +3,8 @@
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::{Field, Row};
 use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -60,6 +62,18 @@ fn floats(got: &Received, name: &str) -> Vec<f32> {
 /// Where the tip of the left arm is commanded to be (m).
 fn place(frame: &Received) -> Vec<f32> {
     floats(frame, "arms")[9..12].to_vec()
+}
+
+/// A column of a file of channels.
+fn column(file: &Path, name: &str) -> Vec<f64> {
+    let reader = SerializedFileReader::new(std::fs::File::open(file).unwrap()).unwrap();
+    let number = |row: &Row| {
+        row.get_column_iter().find_map(|(own, field)| match field {
+            Field::Double(x) if own == name => Some(*x),
+            _ => None,
+        })
+    };
+    reader.get_row_iter(None).unwrap().map(|row| number(&row.unwrap()).unwrap()).collect()
 }
 
 /// The scripted episode without a viewer.
@@ -256,6 +270,12 @@ fn an_operator_moves_an_arm_and_the_episode_replays() {
     }
     let actors = std::fs::read_to_string(path.join("actors.csv")).unwrap();
     assert!(actors.contains(",operator,policy\n") && actors.contains(",hold,policy\n"), "{actors}");
+    let codes = actors.lines().skip(1).map(|line| match line.split(',').nth(1) {
+        Some("policy") => 0.0,
+        Some("operator") => 1.0,
+        _ => 2.0,
+    });
+    assert_eq!(column(&path.join("channels.parquet"), "left_actor"), codes.collect::<Vec<f64>>());
     // An operator that is gone pauses the simulation, and whoever comes next is told.
     client.ask(json!({"type": "pause"}), 6).unwrap();
     client.send(&json!({"type": "servo_jaw", "arm": "right", "seq": 1, "time_s": 0, "opening": 0.5})).unwrap();
@@ -286,4 +306,28 @@ fn an_operator_moves_an_arm_and_the_episode_replays() {
     let last = seek(length, 3);
     assert!(last != begin && seek(0.0, 4) == begin && seek(length, 5) == last);
     assert_eq!(status(&mut client, |s| s["mode"] == "ended")["exact"], true);
+}
+
+#[test]
+fn an_end_that_the_policy_chose_is_kept_and_replayed() {
+    let folder = tempfile::tempdir().unwrap();
+    let specimen = folder.path().join("tube");
+    two_tubes(ONE_END, 3e-3).write(&specimen).unwrap();
+    // The lift of a specimen goes on after it is passed, until its script is done.
+    let server = start(&specimen, "scripted", Some(folder.path().join("kept")), 0.0);
+    let mut client = ready(&server);
+    client.ask(json!({"type": "play"}), 2).unwrap();
+    let ended = status(&mut client, |s| s["mode"] == "ended");
+    assert!(ended["end"]["kind"] == "passed" || ended["end"]["kind"] == "finished", "{ended}");
+    assert!(ended["time_s"].as_f64() < ended["length_s"].as_f64(), "{ended}");
+    // It is the same after a look at what came before.
+    client.ask(json!({"type": "seek", "time_s": 0.5}), 3).unwrap();
+    status(&mut client, |s| s["mode"] == "review" && s["seeking"] == false);
+    let done = client.ask(json!({"type": "record", "action": "keep"}), 4).unwrap().header;
+    let path = PathBuf::from(done["path"].as_str().unwrap());
+    let file = EpisodeFile::read(&path.join("episode.trocar")).unwrap();
+    assert_eq!(json!(file.header.end.as_ref().map(trocar_task::End::name)), ended["end"]["kind"]);
+    server.stop().unwrap();
+    let verdict = trocar_workflow::replay(&path, None, Path::new("none"), 1, &Silent).unwrap();
+    assert!(verdict.same, "{verdict:?}");
 }

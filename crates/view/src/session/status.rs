@@ -2,8 +2,8 @@
 
 use super::Session;
 use crate::hub::Hub;
-use crate::operator::arm_of;
-use serde_json::{Map, Value, json};
+use crate::readings::actors;
+use serde_json::json;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use trocar_core::Progress;
@@ -31,9 +31,7 @@ impl Session {
         self.told = Instant::now();
         let (show, period) = (&self.show, self.show.period());
         let file = show.file.as_ref();
-        let cell = show.episode.cell();
-        let actors: Map<String, Value> =
-            cell.arms().iter().map(|(s, _)| (s.name().to_owned(), json!(show.actor(arm_of(*s))))).collect();
+        let actors = actors(&show.episode, |arm| show.actor(arm));
         let end = show.episode.end().filter(|_| !show.in_review());
         let progress = show.episode.progress();
         let folder = self.recorder.as_ref().map(|r| r.folder.display().to_string());
