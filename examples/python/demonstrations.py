@@ -153,7 +153,7 @@ class Operator:
 
 
 def demonstrate(options):
-    """Keeps episodes until there are enough. Returns the next seed."""
+    """Keeps episodes until there are enough. Returns the next seed, and how many were kept."""
     words = [
         "--policy",
         "operator",
@@ -191,7 +191,7 @@ def demonstrate(options):
                     flush=True,
                 )
             print(f"{kept} of {seed} kept; {loop.late} of {loop.steps} samples late", flush=True)
-    return seed
+    return seed, kept
 
 
 def run(*words):
@@ -209,20 +209,30 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--episodes", type=int, default=10, help="that are kept")
     parser.add_argument("--steps", type=int, default=3000, help="of training")
-    parser.add_argument("--tests", type=int, default=20, help="episodes of each policy")
+    parser.add_argument("--tests", type=int, default=10, help="episodes of each policy")
     parser.add_argument("--program", default="trocar")
     parser.add_argument("--speed", type=float, default=1.0, help="simulated over wall time")
     parser.add_argument("--no-force", action="store_true", help="the device gets no force")
     parser.add_argument("--threads", type=int, default=0, help="of trocar view (default: all)")
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="the way with two demonstrations and a test of each policy",
+    )
     parser.add_argument("-o", "--output", type=Path, default=Path("lifts"))
     options = parser.parse_args()
+    if options.quick:
+        # One is trained on, one is held out.
+        options.episodes, options.steps, options.tests = 2, 50, 1
     out, program = options.output, options.program
     if out.exists():
         raise SystemExit(f"error: {out} exists")
     out.mkdir(parents=True)
     text = SCENE.read_text()
     (out / "scene.toml").write_text(text.replace("episode_s = 8.0", f"episode_s = {SECONDS}"))
-    seed = demonstrate(options)
+    seed, kept = demonstrate(options)
+    if kept < options.episodes:
+        raise SystemExit(f"error: {kept} of {options.episodes} episodes were kept")
     for folder in sorted((out / "demonstrations").iterdir()):
         run(program, "replay", folder, "--verify")
     run(program, "export", out / "demonstrations", "-o", out / "dataset", "--size", "84x84",

@@ -2,8 +2,10 @@
 
 import json
 import os
+import socket
 import struct
 import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -276,6 +278,26 @@ def test_an_operator_feels_an_organ_of_the_program(viewer):
             time.sleep(0.5)
             assert device.active < 1e-6
         assert not session.refusals, session.refusals
+
+
+def test_a_launched_program_ends_with_a_killed_parent(viewer):
+    code = f"""
+import time
+from trocar import teleop
+session = teleop.launch("cell-a", "--paused", program={viewer!r})
+print(session._wire._socket.remote_address[1], flush=True)
+time.sleep(60)
+"""
+    parent = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    with parent:
+        place = ("127.0.0.1", int(parent.stdout.readline()))
+        socket.create_connection(place).close()
+        parent.kill()
+    end = time.monotonic() + 30.0
+    with pytest.raises(OSError):
+        while time.monotonic() < end:
+            socket.create_connection(place).close()
+            time.sleep(0.1)
 
 
 def blocks():

@@ -7,7 +7,9 @@ The pictures are made of `surfaces.trocar` beside each episode, without simulati
 the scene, any size, one picture every control period, however fast the episode was recorded. An
 episode without that file is replayed, and every step compared with the recorded one.
 
-Only episodes that passed are exported, unless all are asked for.
+Only episodes that passed are exported, unless all are asked for. Frames of demonstrations have
+`actor` in a LeRobot dataset: who moved the left and the right arm (0 the policy, 1 an operator, 2
+nobody while an operator had it).
 """
 
 from __future__ import annotations
@@ -31,6 +33,10 @@ from .envs.cells import RECORDING_CAMERA, phantoms_folder
 LAYOUTS = ("lerobot", "robomimic")
 #: The file that makes a folder an episode's.
 EPISODE_FILE = "episode.trocar"
+#: Its channels, and the columns of demonstrations beside them; the file of a demonstration.
+CHANNELS_FILE = "channels.parquet"
+ACTORS = ("left_actor", "right_actor")
+ACTORS_FILE = "actors.csv"
 #: Called with the numbers of finished and of missing episodes: before the first and after each.
 Progress = Callable[[int, int], None]
 
@@ -101,6 +107,20 @@ class _Episode:
             pictures = {name: self.native.picture(name, *size) for name, size in sizes.items()}
             yield self.native.state, self.native.score, pictures
 
+    def actors(self) -> np.ndarray:
+        """Who moved the left and the right arm in each step (steps, 2).
+
+        0 the policy, 1 an operator, 2 nobody while an operator had it. Policies alone where nobody
+        noted it.
+        """
+        import pyarrow.parquet as pq
+
+        table = pq.ParquetFile(self.folder / CHANNELS_FILE)
+        if not set(ACTORS) <= set(table.schema_arrow.names):
+            return np.zeros((len(self.actions), len(ACTORS)), np.float32)
+        columns = table.read(columns=list(ACTORS))
+        return np.stack([columns[name].to_numpy() for name in ACTORS], 1).astype(np.float32)
+
     def normalized(self) -> np.ndarray:
         """The actions with every number in [-1, 1], as environments take with `normalize=True`."""
         low, high = np.array(self.limits["low"]), np.array(self.limits["high"])
@@ -108,9 +128,15 @@ class _Episode:
 
 
 class _LeRobot:
-    """Writes a LeRobot dataset."""
+    """Writes a LeRobot dataset.
 
-    def __init__(self, output: Path, episode: _Episode, sizes: dict[str, tuple[int, int]]):
+    With `acted` each frame says who moved the arms, as learners from interventions need it.
+    """
+
+    def __init__(
+        self, output: Path, episode: _Episode, sizes: dict[str, tuple[int, int]], acted: bool
+    ):
+        self.acted = acted
         names = episode.header["state_names"]
         features: dict[str, Any] = {
             "observation.state": {"dtype": "float32", "shape": (len(names),), "names": names}
@@ -123,13 +149,19 @@ class _LeRobot:
             }
         names = episode.limits["names"]
         features["action"] = {"dtype": "float32", "shape": (len(names),), "names": names}
+        if acted:
+            features["actor"] = {"dtype": "float32", "shape": (2,), "names": list(ACTORS)}
         self.writer = LeRobotWriter(output, fps=episode.fps, features=features)
 
     def write(self, episode: _Episode, sizes: dict[str, tuple[int, int]]) -> None:
-        for (state, _, pictures), action in zip(episode.frames(sizes), episode.actions):
+        actors = episode.actors() if self.acted else None
+        for k, ((state, _, pictures), action) in enumerate(
+            zip(episode.frames(sizes), episode.actions)
+        ):
             self.writer.add_frame(
                 {"observation.state": state, "action": action.astype(np.float32)}
                 | {f"observation.images.{camera}": p for camera, p in pictures.items()}
+                | ({} if actors is None else {"actor": actors[k]})
             )
         self.writer.save_episode(episode.header["prompt"])
 
@@ -257,6 +289,7 @@ def _write(
     writer: _LeRobot | _Robomimic | None = None
     first: tuple[Any, ...] | None = None
     frames, exported, notes = 0, 0, []
+    acted = any((folder / ACTORS_FILE).exists() for folder in folders)
     for done, folder in enumerate(folders, 1):
         result = folder / "result.json"
         # An episode that did not pass need not be replayed.
@@ -269,7 +302,11 @@ def _write(
         kind = (episode.fps, episode.space, episode.limits["names"], sizes)
         if writer is None:
             first = kind
-            writer = (_LeRobot if layout == "lerobot" else _Robomimic)(output, episode, sizes)
+            writer = (
+                _LeRobot(output, episode, sizes, acted)
+                if layout == "lerobot"
+                else _Robomimic(output, episode, sizes)
+            )
         elif kind != first:
             raise ValueError(
                 f"{folder}: has another rate, other actions or pictures than the first"

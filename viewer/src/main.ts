@@ -97,7 +97,8 @@ function start(): void {
   session.on("hello", (hello) => {
     if (hello.version !== VERSION) say(`The simulator speaks version ${hello.version} of the wire; this page needs ${VERSION}.`, "bad");
     const holder = hello.seats["controls"];
-    if (holder === null || holder === undefined) connection.send({ type: "seats", take: ["controls"], give: [] } as { type: string });
+    if (session.watches) say("This page watches. The program that steps the environment has the controls.");
+    else if (holder === null || holder === undefined) connection.send({ type: "seats", take: ["controls"], give: [] } as { type: string });
     else if (holder !== hello.client) say("Another page has the controls. This one watches.");
   });
   if (token !== null) connection.open();

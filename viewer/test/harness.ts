@@ -15,6 +15,7 @@ export interface Inside {
     latencyMs: number | null;
     organs: { name: string; positions: Float32Array; version: number }[];
     has(seat: string): boolean;
+    emit(kind: "problem", text: string): void;
     arm(arm: number, column: string): number;
     armVector(arm: number, column: string, count: number): number[];
     status: { time_s: number; actors: Record<string, string> } | null;

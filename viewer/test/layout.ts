@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import type { Page } from "playwright-core";
 import { at, findBrowser, launch } from "./browser.ts";
-import { onFake, turn } from "./harness.ts";
+import { inside, onFake, turn } from "./harness.ts";
 
 const skip = findBrowser() ? false : "no Chromium here; install it or name it in CHROMIUM";
 const TABS = ["task", "show", "plots", "drive", "episodes"];
@@ -99,6 +99,22 @@ test("the page at both widths", { skip }, async (t) => {
       await page.evaluate("window.shifted.length = 0");
       await page.waitForTimeout(1500);
       assert.deepEqual(await page.evaluate("window.shifted"), []);
+    });
+    await t.test(`a notice covers neither the legend nor the small picture, ${width} pixels`, async () => {
+      await at(page, "tab-show").click();
+      await turn(page, "show-rcm", true);
+      await inside(page, ({ session }) => session.emit("problem", "The arms could not be taken, because another operator has both of them now."));
+      const boxes = await page.evaluate(() => [".toast", ".legend", ".inset", ".view-tools .button"].map((name) => {
+        const { left, right, top, bottom } = document.querySelector(name)!.getBoundingClientRect();
+        return { name, left, right, top, bottom };
+      }));
+      const [toast, ...others] = boxes;
+      assert.ok(toast && toast.right - toast.left > 100, "it is shown");
+      for (const other of others) {
+        const apart = toast.right <= other.left || toast.left >= other.right || toast.bottom <= other.top || toast.top >= other.bottom;
+        assert.ok(apart, `it covers ${other.name}`);
+      }
+      await turn(page, "show-rcm", false);
     });
     await t.test(`the keyboard reaches the view, the tabs and the playback, ${width} pixels`, async () => {
       const reached = new Set<string>();

@@ -284,6 +284,19 @@ test("the page", { skip }, async (t) => {
     assert.notEqual(holder, 999);
   });
 
+  await t.test("an environment is watched: nothing is taken, nothing can be driven", async () => {
+    server.kind = "environment";
+    server.drop();
+    await says(page, "toast", /steps the environment has the controls/);
+    await says(page, "chip-actors", /Stepped by its own program/);
+    await at(page, "tab-drive").click();
+    assert.match((await page.locator("#panel-drive").textContent()) ?? "", /This page watches/);
+    assert.equal(await at(page, "play").isDisabled(), true);
+    assert.deepEqual(server.seats, { controls: null, left: null, right: null });
+    const frames = await inside(page, ({ session }) => session.framesReceived);
+    await expectSoon(async () => (await inside(page, ({ session }) => session.framesReceived)) > frames, true, "frames come");
+  });
+
   await t.test("wrote no errors", () => {
     const unexpected = errors.filter((text) => !/WebSocket connection|GPU stall|ERR_CONNECTION/.test(text));
     assert.deepEqual(unexpected, []);

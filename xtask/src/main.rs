@@ -32,6 +32,7 @@ const API_DOCS: Check =
 const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests, examples, docs, Python and the page, warnings as errors
        cargo xtask python        ruff, mypy and the tests of the Python package alone (skipped without Python or network)
        cargo xtask viewer        the page of the live view: build, unit tests, tests in headless Chromium (skipped without Node)
+       cargo xtask package       all crates into target/package, the page of the live view with them (needs Node)
        cargo xtask docs          the API documentation, and the book in target/book where mdbook is installed
        cargo xtask tools         fetch the programs and libraries that some tests compare with (test does this too)
        cargo xtask peers         our stepping beside Newton and MuJoCo on one mesh (peers from PyPI; scripts from ../shared/peers)
@@ -48,6 +49,7 @@ fn main() -> ExitCode {
         }
         ["python"] => code(check_python(python::Build::Module)),
         ["viewer"] => code(check_viewer(viewer::Tests::Browser)),
+        ["package"] => code(told(&viewer::package())),
         ["docs"] => code(docs()),
         ["tools"] => {
             tools::fetch();

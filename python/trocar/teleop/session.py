@@ -218,9 +218,7 @@ class Session:
             if thread is not threading.current_thread():
                 thread.join(TIMEOUT_S)
         if self._process is not None:
-            self._process.terminate()
-            self._process.wait()
-            self._process.stdout.close()
+            _end_process(self._process)
             self._process = None
 
     # Seats and controls.
@@ -380,6 +378,14 @@ class Session:
             self._news.notify_all()
 
 
+def _end_process(process: Any) -> None:
+    """Ends a launched program and closes its pipes."""
+    process.terminate()
+    process.wait()
+    process.stdout.close()
+    process.stdin.close()
+
+
 def connect(address: str, *, controls: bool = True) -> Session:
     """Connects to a running `trocar view`, at the address that it prints.
 
@@ -390,17 +396,19 @@ def connect(address: str, *, controls: bool = True) -> Session:
 
 
 def launch(source: str, *options: str, program: str = "trocar") -> Session:
-    """Starts `trocar view SOURCE OPTIONS` without a page, and connects. Closing ends it."""
-    words: Sequence[str] = (program, "view", source, "--no-open", "--json", "--port", "0", *options)
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True)
+    """Starts `trocar view SOURCE OPTIONS` without a page, and connects. Closing ends it.
+
+    It also ends with this process, even if that is killed: it reads the other end of a pipe.
+    """
+    view: Sequence[str] = (program, "view", source, "--no-open", "--json", "--port", "0")
+    words = (*view, "--until-eof", *options)
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stdin=subprocess.PIPE, text=True)
     assert process.stdout is not None
     line = process.stdout.readline()
     try:
         return Session(json.loads(line)["wire"], process=process)
     except BaseException as why:
-        process.terminate()
-        process.wait()
-        process.stdout.close()
+        _end_process(process)
         if not line:
             raise OSError(f"{' '.join(words)} ended with status {process.returncode}") from why
         raise

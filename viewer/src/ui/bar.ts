@@ -47,7 +47,8 @@ export class Bar {
   private showActors(): void {
     const actors = Object.entries(this.session.status?.actors ?? {});
     const driven = actors.filter(([, actor]) => actor === "operator").map(([arm]) => arm);
-    if (driven.length > 0) show(this.actors, driven.length > 1 ? "You or a device drive both arms" : `Operator drives ${driven[0]} arm`, "acting");
+    if (this.session.watches) show(this.actors, "Stepped by its own program", "plain");
+    else if (driven.length > 0) show(this.actors, driven.length > 1 ? "You or a device drive both arms" : `Operator drives ${driven[0]} arm`, "acting");
     else show(this.actors, actors.some(([, a]) => a === "replay") ? "Replay" : `Policy: ${this.session.status?.policy ?? "–"}`, "plain");
   }
 }

@@ -80,7 +80,10 @@ export class DrivePanel {
       this.record.root,
     );
     setInterval(() => this.tick(), 33);
-    session.on("hello", () => this.choose(""));
+    session.on("hello", () => {
+      if (session.watches) this.root.replaceChildren(el("p", {}, "The program that steps the environment moves the arms. This page watches."));
+      else this.choose("");
+    });
     session.on("frame", () => {
       setText(this.delay, number(session.latencyMs, 0, "ms"));
       this.rumble();

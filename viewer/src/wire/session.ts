@@ -103,6 +103,11 @@ export class Session extends Emitter<Events> {
     return client !== null && client !== undefined && client !== this.hello?.client;
   }
 
+  /** Whether clients only watch: the simulation is an environment that another program steps. */
+  get watches(): boolean {
+    return this.hello?.source.kind === "environment";
+  }
+
   get arms(): Arm[] {
     return this.scene?.header.arms ?? [];
   }

@@ -39,6 +39,8 @@ export class FakeServer {
   policy = "scripted";
   seed = 0;
   record: string | null = "/tmp/demonstrations";
+  /** What is shown; an environment is watched, and nothing of it can be driven. */
+  kind = "scene";
   kept = 0;
   open: string | null = null;
   /** Sends no frames: a simulator that hangs. */
@@ -123,7 +125,7 @@ export class FakeServer {
     });
     socket.on("message", (data) => this.receive(client, JSON.parse(String(data)) as Message));
     this.send(client, {
-      type: "hello", version: 1, program: "0.1.0", client: client.number, source: { kind: "scene", name: "cell-a" },
+      type: "hello", version: 1, program: "0.1.0", client: client.number, source: { kind: this.kind, name: "cell-a" },
       policies: ["scripted", "noise", "operator"], record: this.record, seats: this.seats, speeds: [], command_life_ms: COMMAND_LIFE_MS,
     });
     this.sendStatus(client);

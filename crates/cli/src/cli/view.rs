@@ -35,6 +35,9 @@ pub struct View {
     /// Do not open the page, only print its address.
     #[arg(long)]
     pub no_open: bool,
+    /// End at the end of the standard input, so that the program ends with the one that started it.
+    #[arg(long)]
+    pub until_eof: bool,
     /// Worker threads; all by default. The result does not depend on them.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,

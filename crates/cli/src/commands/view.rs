@@ -2,6 +2,8 @@
 
 use crate::{cli, open, output};
 use serde::Serialize;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use trocar_core::Progress;
 use trocar_view::{Building, Options, Server, Source, build_page};
@@ -28,6 +30,15 @@ pub fn run(arguments: &cli::View, json: bool, progress: &dyn Progress) -> Result
     let speed = arguments.speed;
     if speed != 0.0 && !(0.125..=8.0).contains(&speed) {
         return Err(Error::Mismatch(format!("--speed {speed}: it must be in [0.125, 8], or 0")));
+    }
+    let left = Arc::<AtomicBool>::default();
+    if arguments.until_eof {
+        let left = Arc::clone(&left);
+        std::thread::spawn(move || {
+            // What comes is not meant for anyone; an error is an end, too.
+            let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+            left.store(true, Ordering::Relaxed);
+        });
     }
     progress.begin("the page", 1);
     let missing = build_page();
@@ -61,7 +72,7 @@ pub fn run(arguments: &cli::View, json: bool, progress: &dyn Progress) -> Result
     if started.page && !arguments.no_open && !json {
         open::in_browser(&started.address, "the page");
     }
-    while !progress.interrupted() && !server.has_ended() {
+    while !progress.interrupted() && !server.has_ended() && !left.load(Ordering::Relaxed) {
         std::thread::sleep(POLL_INTERVAL);
     }
     server.stop().map_err(wrong)

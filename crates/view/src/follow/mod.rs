@@ -61,7 +61,7 @@ impl Follower {
     /// A port that is in use, shapes that cannot be read.
     pub fn start(name: &str, episode: &Episode, port: u16) -> Result<Self> {
         let hello = json!({
-            "source": {"kind": "environment", "name": name}, "policies": [], "record": null, "speeds": [],
+            "source": {"kind": "environment", "name": name}, "policies": [ACTOR], "record": null, "speeds": [],
         });
         let hub = Arc::new(Hub::watched(WATCHED));
         let cannot = |why: std::io::Error| Error::Source(format!("a thread cannot be started: {why}"));
