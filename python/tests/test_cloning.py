@@ -99,6 +99,18 @@ def test_the_rise_begins_where_the_jaws_take_hold(example):
     assert heights == [0.0, 0.0, 0.5, 0.0, 0.0, 0.25]
 
 
+@pytest.mark.skipif(
+    "TROCAR_REALTIME" not in os.environ,
+    reason="runs in real time: set TROCAR_REALTIME=1 on an idle machine",
+)
+def test_the_whole_way_from_an_operator_to_a_table_is_one_command(program, tmp_path):
+    out = tmp_path / "lifts"
+    told = run("demonstrations.py", "--quick", "--program", program, "-o", out)
+    assert "2 of 2 kept" in told and told.count("--verify") == 2
+    result = json.loads((out / "campaign/result.json").read_text())
+    assert [row["policy"] for row in result["policies"]] == ["cloned", "scripted", "noise"]
+
+
 def test_a_cloned_policy_runs_in_a_campaign(cloned, tmp_path):
     scene = changed_scene(tmp_path, "grasp-lift", 0.6)
     names = ["pictures_0", "states_0"]

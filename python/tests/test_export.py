@@ -96,6 +96,30 @@ def test_a_lerobot_dataset_holds_what_an_environment_shows(dataset, seen, tmp_pa
     assert np.abs(video - wanted).mean() < 0.5 * np.abs(wanted - pictures[:-1]).mean()
 
 
+def test_frames_of_demonstrations_say_who_moved_the_arms(lifts, tmp_path):
+    pa = pytest.importorskip("pyarrow")
+    import pyarrow.parquet as pq
+
+    passed = next(lifts.rglob("scripted/000000"))
+    for name in ("plain", "driven"):
+        shutil.copytree(passed, tmp_path / "lifts" / name)
+    # As `trocar view --record` writes them.
+    (tmp_path / "lifts/driven/actors.csv").write_text("step,left,right\n")
+    channels = tmp_path / "lifts/driven/channels.parquet"
+    table = pq.read_table(channels)
+    by_operator = np.arange(len(table)) % 3.0
+    for column, values in (("left_actor", by_operator), ("right_actor", 0.0 * by_operator)):
+        table = table.append_column(column, pa.array(values))
+    pq.write_table(table, channels)
+    export.export([tmp_path / "lifts"], tmp_path / "dataset", cameras=[])
+    info = json.loads((tmp_path / "dataset/meta/info.json").read_text())
+    assert info["features"]["actor"]["names"] == ["left_actor", "right_actor"]
+    frames = pd.concat(map(pd.read_parquet, sorted((tmp_path / "dataset/data").rglob("*.parquet"))))
+    driven, plain = (frames[frames["episode_index"] == k] for k in (0, 1))
+    assert np.array_equal(np.stack(driven["actor"])[:, 0], by_operator)
+    assert not np.stack(plain["actor"]).any()
+
+
 def test_a_robomimic_file_holds_what_an_environment_shows(file, seen):
     states, pictures, actions, rewards = seen
     with h5py.File(file) as opened:

@@ -280,11 +280,11 @@ def test_an_operator_feels_an_organ_of_the_program(viewer):
         assert not session.refusals, session.refusals
 
 
-def test_a_launched_program_ends_with_a_killed_parent(viewer):
+def test_a_launched_program_ends_with_a_killed_parent(program):
     code = f"""
 import time
 from trocar import teleop
-session = teleop.launch("cell-a", "--paused", program={viewer!r})
+session = teleop.launch("cell-a", "--paused", program={program!r})
 print(session._wire._socket.remote_address[1], flush=True)
 time.sleep(60)
 """

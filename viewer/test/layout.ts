@@ -115,6 +115,7 @@ test("the page at both widths", { skip }, async (t) => {
         assert.ok(apart, `it covers ${other.name}`);
       }
       await turn(page, "show-rcm", false);
+      await at(page, "tab-task").click();
     });
     await t.test(`the keyboard reaches the view, the tabs and the playback, ${width} pixels`, async () => {
       const reached = new Set<string>();
