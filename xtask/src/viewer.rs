@@ -48,6 +48,10 @@ pub fn check(tests: Tests) -> Result<(), &'static str> {
 /// into its folder for that time only: a program of a clone serves `viewer/dist`, which changes.
 pub fn package() -> Result<(), String> {
     node().map_err(|why| format!("packages carry the page, which Node builds: {why}"))?;
+    let changed = Command::new("git").args(["status", "--porcelain"]).output().map_err(|e| format!("git: {e}"))?;
+    if !changed.status.success() || !changed.stdout.is_empty() {
+        return Err("packages are made of what is committed; commit first".to_owned());
+    }
     if !npm(&["ci", "--no-audit", "--no-fund", "--loglevel=error"]) || !npm(&["run", "--silent", "build"]) {
         return Err("the page cannot be built".to_owned());
     }
@@ -56,7 +60,8 @@ pub fn package() -> Result<(), String> {
     let remove = || if page.exists() { std::fs::remove_dir_all(page) } else { Ok(()) };
     remove().map_err(|e| told("removed", page, e))?;
     copy(&Path::new(FOLDER).join("dist"), page).map_err(|e| told("written", page, e))?;
-    let packaged = crate::cargo(&["package", "--workspace", "--no-verify", "--locked"], &[]);
+    // Only the page is not committed.
+    let packaged = crate::cargo(&["package", "--workspace", "--no-verify", "--locked", "--allow-dirty"], &[]);
     remove().map_err(|e| told("removed", page, e))?;
     if packaged { Ok(()) } else { Err("cargo package fails".to_owned()) }
 }
