@@ -59,6 +59,7 @@ fn built(sources: &Path, place: &Path) -> Result<()> {
     if place.is_dir() {
         std::fs::remove_dir_all(place)?;
     }
+    std::fs::create_dir_all(place)?;
     for name in SOURCES {
         copy(&sources.join(name), &place.join(name))?;
     }
@@ -73,6 +74,7 @@ fn built(sources: &Path, place: &Path) -> Result<()> {
             return Err(format!("npm {} fails: {told}", arguments[0]).into());
         }
     }
+    std::fs::remove_dir_all(place.join("node_modules"))?;
     Ok(())
 }
 

@@ -12,8 +12,8 @@ from .envs.options import checked_int
 
 #: What has to be done for a page that this build lacks.
 _NO_PAGE = (
-    "this build of trocar has no page of the live view: install Node 20.19 or newer with npm, and "
-    "install trocar again (pip install .)"
+    "this build of trocar has no page of the live view: with Node 20.19 or newer and npm, install "
+    "trocar again (pip install .), or in a clone run npm ci && npm run build in viewer"
 )
 
 
