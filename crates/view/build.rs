@@ -35,7 +35,7 @@ fn main() -> Result<()> {
         match built(&sources, &place) {
             Ok(()) => root = place.join("dist"),
             Err(why) => {
-                println!("cargo:warning=the page of the live view is not built, and trocar.view says so: {why}")
+                println!("cargo:warning=the page of the live view is not built, and trocar.view says so: {why}");
             }
         }
     }

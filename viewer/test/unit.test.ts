@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import * as THREE from "three";
+import { distorted, ideal } from "../src/scene/lens.ts";
 import { AxisTest } from "../src/teleop/axis-test.ts";
 import { Clutch, type Anchor } from "../src/teleop/clutch.ts";
 import { atRest, axesOf, type Device } from "../src/teleop/device.ts";
@@ -25,6 +26,16 @@ test("a binary message gives its arrays without a copy", () => {
   assert.equal(message.f32("poses").buffer, packed);
   assert.equal(message.rows("poses"), 3);
   assert.equal(message.has("toString"), false);
+});
+
+test("a lens bends as OpenCV does, and back", () => {
+  const k = [-0.3, 0.1, 0.001, -0.002, 0.01, 0.02, -0.01, 0.005];
+  // By projectPoints of OpenCV 5.
+  const [u, v] = distorted(k, 0.4, -0.3);
+  assert.ok(Math.hypot(u - 0.36953078789764343, v + 0.2772730909232326) < 1e-12, `${u} ${v}`);
+  const [x = 0, y = 0] = ideal(k, u, v) ?? [];
+  assert.ok(Math.hypot(x - 0.4, y + 0.3) < 1e-8, `${x} ${y}`);
+  assert.equal(ideal([-0.3, 0, 0, 0], 3, 0), null, "beyond the fold there is nothing");
 });
 
 test("damaged binary messages are errors, never half-read", () => {

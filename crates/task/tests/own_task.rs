@@ -193,7 +193,7 @@ fn an_end_that_the_policy_chose_is_replayed_too() {
     let verdict = verify(&recording.file);
     assert!(verdict.same, "{verdict:?}");
     // Another end is found.
-    let mut other = recording.file.clone();
+    let mut other = recording.file;
     other.header.end = Some(End::Finished);
     assert_eq!(verify(&other).said, "it ends with passed, not finished");
 }

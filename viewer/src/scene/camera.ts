@@ -3,15 +3,18 @@
 import * as THREE from "three";
 import type { CameraModel } from "../wire/messages.ts";
 import { setPose } from "./bodies.ts";
+import { Lens } from "./lens.ts";
 
 const NEAR_M = 0.002;
 const FAR_M = 3;
 /** Half a turn about x: from OpenCV's axes (y down, z forward) to three's (y up, z back). */
 const TO_THREE = new THREE.Quaternion(1, 0, 0, 0);
 
-/** A camera of the scene as three draws it. The lens's distortion is not drawn. */
+/** A camera of the scene as three draws it. */
 export class SceneCamera {
+  /** Without the lens's distortion. */
   readonly camera = new THREE.PerspectiveCamera();
+  private bent: Lens | null = null;
 
   constructor(readonly model: CameraModel) {
     setPose(this.camera, model.pose, 0);
@@ -33,6 +36,17 @@ export class SceneCamera {
   /** Whether the lens distorts so much that the drawn picture differs from the camera's. */
   get distorts(): boolean {
     return (this.model.distortion ?? []).some((k) => Math.abs(k) > 1e-6);
+  }
+
+  /** What draws with the lens's distortion; null where there is none. */
+  get lens(): Lens | null {
+    if (this.distorts) this.bent ??= new Lens(this.model, this.camera);
+    return this.bent;
+  }
+
+  dispose(): void {
+    this.bent?.dispose();
+    this.bent = null;
   }
 
   /** The frustum as lines, to a depth (m). */

@@ -22,6 +22,7 @@ export class Cameras {
     session.on("scene", (scene) => {
       for (const child of this.group.children) (child as THREE.LineSegments).geometry.dispose();
       this.group.clear();
+      for (const camera of this.list) camera.dispose();
       this.list.length = 0;
       for (const model of scene.header.cameras) {
         const camera = new SceneCamera(model);

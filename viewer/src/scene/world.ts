@@ -74,13 +74,14 @@ export class World {
     for (const draw of this.before) draw();
     const { x: width, y: height } = this.size;
     this.through?.camera.layers.enable(LAYER_OVERLAY);
-    this.drawFrom(this.through, 0, 0, width, height);
+    // In the large view things are pointed at: it is straight.
+    this.drawFrom(this.through, 0, 0, width, height, true);
     this.through?.camera.layers.disable(LAYER_OVERLAY);
     this.pictures += 1;
   }
 
-  /** Draws what a camera sees into a rectangle of the canvas (CSS pixels, from below left). */
-  drawFrom(from: SceneCamera | null, x: number, y: number, width: number, height: number): void {
+  /** Draws what a camera sees into a rectangle of the canvas (CSS pixels, from below left); `straight`: without its lens's distortion. */
+  drawFrom(from: SceneCamera | null, x: number, y: number, width: number, height: number, straight = false): void {
     const { renderer } = this;
     renderer.setScissorTest(true);
     renderer.setScissor(x, y, width, height);
@@ -101,14 +102,17 @@ export class World {
     }
     this.scene.background = INSIDE;
     const aspect = from.model.width / from.model.height;
-    if (width / height > aspect || width / height < aspect) {
+    const w = Math.min(width, height * aspect);
+    const h = Math.min(height, width / aspect);
+    const lens = straight ? null : from.lens;
+    if (lens || w < width || h < height) {
       renderer.setClearColor(INSIDE);
       renderer.clear();
-      const w = Math.min(width, height * aspect);
-      const h = Math.min(height, width / aspect);
       renderer.setViewport(x + (width - w) / 2, y + (height - h) / 2, w, h);
     }
-    renderer.render(this.scene, from.camera);
+    const ratio = renderer.getPixelRatio();
+    if (lens) lens.draw(renderer, this.scene, w * ratio, h * ratio);
+    else renderer.render(this.scene, from.camera);
   }
 
   /** The camera that the main view looks through. */

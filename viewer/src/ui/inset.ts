@@ -63,8 +63,6 @@ export class Inset {
     this.showTraced(null);
     if (this.world.through && this.camera) this.world.through = this.camera;
     const camera = this.camera;
-    this.caption.hidden = !camera?.distorts;
-    if (camera?.distorts) setText(this.caption, "Drawn without the lens's distortion");
     const circle = camera?.model.circle;
     const aspect = camera ? camera.model.width / camera.model.height : 16 / 9;
     this.canvas.style.clipPath = circle && !this.world.through ? `ellipse(${(50 * circle) / aspect}% ${50 * circle}% at 50% 50%)` : "";
@@ -136,8 +134,9 @@ export class Inset {
       this.caption.hidden = false;
     } else {
       this.traced.removeAttribute("src");
-      this.caption.hidden = !this.camera?.distorts;
-      if (this.camera?.distorts) setText(this.caption, "Drawn without the lens's distortion");
+      // The large view is straight, so that what is pointed at is where it is drawn.
+      this.caption.hidden = !(this.world.through && this.camera?.distorts);
+      setText(this.caption, "The large view lacks the lens's distortion");
       this.world.draw();
     }
   }
