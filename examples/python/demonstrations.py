@@ -29,8 +29,13 @@ from trocar.teleop.simulated import DEVICE, HeldDevice
 HERE = Path(__file__).parent
 #: The scene, with time for a human's pace (s).
 SCENE, SECONDS = HERE / "lift_from_pictures.toml", 14.0
-#: The arms' starts vary, the anatomy does not.
+#: The anatomy does not vary; the arms' starts do, as in `cell-a`.
 FIXED = ("--variation", "none")
+STARTS = """set = "none"
+tilt_deg = { within = 1.0 }
+azimuth_deg = { within = 5.0 }
+insertion_mm = { within = 5.0 }
+roll_deg = { within = 10.0 }"""
 #: Way from the jaw's pivot to the middle of what it takes, and way along the shaft by which the
 #: operator comes from behind (m).
 DEPTH, BACK = 0.0141, 0.025
@@ -213,6 +218,7 @@ def main():
     parser.add_argument("--program", default="trocar")
     parser.add_argument("--speed", type=float, default=1.0, help="simulated over wall time")
     parser.add_argument("--no-force", action="store_true", help="the device gets no force")
+    parser.add_argument("--same-start", action="store_true", help="the arms start alike each time")
     parser.add_argument("--threads", type=int, default=0, help="of trocar view (default: all)")
     parser.add_argument(
         "--quick",
@@ -229,7 +235,10 @@ def main():
         raise SystemExit(f"error: {out} exists")
     out.mkdir(parents=True)
     text = SCENE.read_text()
-    (out / "scene.toml").write_text(text.replace("episode_s = 8.0", f"episode_s = {SECONDS}"))
+    text = text.replace("episode_s = 8.0", f"episode_s = {SECONDS}")
+    if not options.same_start:
+        text = text.replace('set = "standard"', STARTS)
+    (out / "scene.toml").write_text(text)
     seed, kept = demonstrate(options)
     if kept < options.episodes:
         raise SystemExit(f"error: {kept} of {options.episodes} episodes were kept")
