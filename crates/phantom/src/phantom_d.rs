@@ -1,9 +1,9 @@
 //! Phantom D: a small liver, seen from below, with a gallbladder that is folded over its neck.
 //!
-//! The gallbladder leaves the liver's lower edge, follows it and turns back, so that its fundus lies
-//! in front of its neck for an eye that looks towards the liver from the fundus. Its sizes are
-//! chosen, not measured: the fold is as narrow as the jaws of a 5 mm instrument can grasp, and wide
-//! enough that the recording camera sees between its limbs.
+//! The gallbladder leaves the liver's lower edge, follows it and turns back, so that its fundus
+//! lies in front of its neck for an eye that looks towards the liver from the fundus. Its sizes are
+//! chosen, not measured: the fundus is slender enough for the jaws of a 5 mm instrument to go round
+//! it, and the fold wide enough for a blade and for the view of the recording camera.
 
 use crate::bed::{Bed, BedSpec};
 use crate::blend::{Blend, BlendSpec, Part};
