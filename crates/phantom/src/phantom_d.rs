@@ -47,14 +47,20 @@ pub(crate) const SPEC: PhantomSpec = PhantomSpec {
     occlusion_reach: 12e-3,
 };
 
-/// Lobes of the liver: centre, semi-axes (mm), direction in the plane of x and y (degrees).
-#[rustfmt::skip]
-const LOBES: [((f64, f64), (f64, f64, f64), f64); 5] = [
-    ((0.0, -36.0), (34.0, 26.0, 14.0), 0.0),
-    ((-40.0, -30.0), (34.0, 18.0, 11.0), 140.0),
-    ((-28.0, -32.0), (26.0, 14.0, 12.0), 108.0),
-    ((36.0, -30.0), (32.0, 19.0, 12.0), 48.0),
-    ((27.0, -31.0), (24.0, 13.0, 13.0), 84.0),
+/// A lobe of the liver: centre, semi-axes (mm), direction in the plane of x and y.
+struct Lobe {
+    at: (f64, f64),
+    radii: (f64, f64, f64),
+    heading_deg: f64,
+}
+
+/// Four lobes below the central one.
+const LOBES: [Lobe; 5] = [
+    Lobe { at: (0.0, -36.0), radii: (34.0, 26.0, 14.0), heading_deg: 0.0 },
+    Lobe { at: (-40.0, -30.0), radii: (34.0, 18.0, 11.0), heading_deg: 140.0 },
+    Lobe { at: (-28.0, -32.0), radii: (26.0, 14.0, 12.0), heading_deg: 108.0 },
+    Lobe { at: (36.0, -30.0), radii: (32.0, 19.0, 12.0), heading_deg: 48.0 },
+    Lobe { at: (27.0, -31.0), radii: (24.0, 13.0, 13.0), heading_deg: 84.0 },
 ];
 /// Height of the liver's middle above the bed (m). The rest sinks in.
 const LIVER_LIFT: f64 = 3e-3;
@@ -102,7 +108,7 @@ fn vary(seed: u64, k: u64, by: f64) -> f64 {
 /// The liver, with a groove for `gallbladder` in its lower edge.
 fn liver(seed: u64, bed: &Bed, gallbladder: Tube) -> Blend {
     let middle = |x: f64, y: f64| DVec3::new(x * 1e-3, y * 1e-3, bed.smooth_height(x * 1e-3, y * 1e-3) - LIVER_LIFT);
-    let parts = LOBES.iter().enumerate().map(|(i, &(at, radii, heading_deg))| {
+    let parts = LOBES.iter().enumerate().map(|(i, &Lobe { at, radii, heading_deg })| {
         let vary = |k: u64, by: f64| vary(seed, 10 * i as u64 + k, by);
         let wider = |k: u64| 1.0 + vary(k, 0.06);
         Part::Ellipsoid {
