@@ -126,7 +126,7 @@ pub struct Demo {
 pub struct Record {
     /// The phantom: phantom-a (rabbit: cecum, three bowel segments, stomach, appendix), phantom-b
     /// (rabbit: bowel bloc, small bowel, appendix, cecum, stomach), phantom-c (pig: liver,
-    /// gallbladder).
+    /// gallbladder), phantom-d (small liver with a folded gallbladder).
     pub phantom: String,
     /// Recording folder to write.
     #[arg(short, long)]

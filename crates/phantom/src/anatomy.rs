@@ -27,13 +27,13 @@ mod tests {
 
     use super::*;
     use crate::body::{Body, gap};
-    use crate::{phantom_a, phantom_b, phantom_c};
+    use crate::{phantom_a, phantom_b, phantom_c, phantom_d};
     use glam::DVec3;
     use std::sync::OnceLock;
     use trocar_camera::Camera;
     use trocar_geometry::{SignedDistance, isosurface, sample_distance};
 
-    const SPECS: [&PhantomSpec; 3] = [&phantom_a::SPEC, &phantom_b::SPEC, &phantom_c::SPEC];
+    const SPECS: [&PhantomSpec; 4] = [&phantom_a::SPEC, &phantom_b::SPEC, &phantom_c::SPEC, &phantom_d::SPEC];
     const SEEDS: std::ops::Range<u64> = 0..6;
 
     /// A phantom with a seed.

@@ -8,7 +8,7 @@
 //! ```
 //! use trocar_phantom::{NAMES, RecordOptions, describe};
 //!
-//! assert_eq!(NAMES, ["phantom-a", "phantom-b", "phantom-c"]);
+//! assert_eq!(NAMES, ["phantom-a", "phantom-b", "phantom-c", "phantom-d"]);
 //! let info = describe("phantom-c", &RecordOptions::default())?;
 //! assert_eq!(info.organs[0].name, "liver");
 //! # Ok::<(), trocar_phantom::Error>(())
@@ -29,6 +29,7 @@ mod paint;
 mod phantom_a;
 mod phantom_b;
 mod phantom_c;
+mod phantom_d;
 mod record;
 mod sensor;
 mod spec;

@@ -5,10 +5,10 @@ use crate::frame::{FrameSettings, record_frame};
 use crate::sensor::Sensor;
 use crate::spec::{PhantomSpec, Resolution};
 use crate::static_view::StaticView;
-use crate::{instruments, phantom_a, phantom_b, phantom_c};
+use crate::{instruments, phantom_a, phantom_b, phantom_c, phantom_d};
 use trocar_camera::{Camera, Mask};
 
-const SPECS: [&PhantomSpec; 3] = [&phantom_a::SPEC, &phantom_b::SPEC, &phantom_c::SPEC];
+const SPECS: [&PhantomSpec; 4] = [&phantom_a::SPEC, &phantom_b::SPEC, &phantom_c::SPEC, &phantom_d::SPEC];
 
 /// Half the resolution of a recording.
 fn coarse(spec: &PhantomSpec) -> Resolution {
@@ -125,7 +125,7 @@ fn recorded_depth_is_within_its_noise_of_the_truth() {
 fn true_depth_within_a_mask_is_on_that_organ() {
     use trocar_geometry::SignedDistance;
     let camera = small();
-    for spec in [&phantom_b::SPEC, &phantom_c::SPEC] {
+    for spec in [&phantom_b::SPEC, &phantom_c::SPEC, &phantom_d::SPEC] {
         let anatomy = Anatomy::new(spec, 2);
         let still =
             StaticView::new(spec, &anatomy, &camera, Resolution { surface: spec.resolution.surface, ..coarse(spec) });
@@ -226,7 +226,7 @@ fn invalid_requests_are_rejected_and_leave_no_files() {
     let unknown = record("fantom-c", &options, &to, silent).unwrap_err().to_string();
     assert_eq!(
         unknown,
-        "no phantom 'fantom-c'; the phantoms are phantom-a, phantom-b, phantom-c; did you mean 'phantom-c'?"
+        "no phantom 'fantom-c'; the phantoms are phantom-a, phantom-b, phantom-c, phantom-d; did you mean 'phantom-c'?"
     );
     let none = record("phantom-a", &RecordOptions { frames: 0, ..options }, &to, silent).unwrap_err().to_string();
     assert!(none.contains("frames is 0"), "{none}");

@@ -17,8 +17,8 @@ pub struct SpecimenSource {
     /// Specimen folder, relative to the scene file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<String>,
-    /// Built-in phantom: phantom-a, phantom-b (rabbits) or phantom-c (a pig's liver and
-    /// gallbladder).
+    /// Built-in phantom: phantom-a, phantom-b (rabbits), phantom-c (a pig's liver and gallbladder)
+    /// or phantom-d (a small liver with a folded gallbladder).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub phantom: Option<String>,
     /// Seed of the phantom's anatomy.

@@ -12,7 +12,7 @@ pub struct Builtin {
 }
 
 /// The built-in scenes.
-pub const BUILTINS: [Builtin; 8] = [
+pub const BUILTINS: [Builtin; 9] = [
     Builtin {
         name: "cell-a",
         summary: "the paper's two-arm cell around phantom A: grasper left, cutter right, resection of the appendix",
@@ -52,6 +52,11 @@ pub const BUILTINS: [Builtin; 8] = [
         name: "cell-c-resection",
         summary: "the same cell: the gallbladder lifted and cut between grasp and neck",
         text: include_str!("../scenes/cell-c-resection.toml"),
+    },
+    Builtin {
+        name: "cell-d-retraction",
+        summary: "a cell around phantom D: the grasper lifts the folded gallbladder's fundus, so that the endoscope sees its neck",
+        text: include_str!("../scenes/cell-d-retraction.toml"),
     },
 ];
 

@@ -13,10 +13,11 @@ pub struct Phantom {
 }
 
 /// The phantoms there are.
-pub const PHANTOMS: [Phantom; 3] = [
+pub const PHANTOMS: [Phantom; 4] = [
     Phantom { name: "phantom-a", organs: &["cecum", "bowel-1", "bowel-2", "bowel-3", "stomach", "appendix"] },
     Phantom { name: "phantom-b", organs: &["cecum", "small-bowel", "bowel-bloc", "stomach", "appendix"] },
     Phantom { name: "phantom-c", organs: &["liver", "gallbladder"] },
+    Phantom { name: "phantom-d", organs: &["liver", "gallbladder"] },
 ];
 
 impl Phantom {

@@ -99,8 +99,8 @@ fn variation() {
         ),
         Case(
             "tilt_deg = { within = 1.0 }",
-            "specimens = { phantoms = [\"phantom-d\"] }§",
-            "variation.specimens.phantoms[0] is 'phantom-d'; the phantoms are: phantom-a, phantom-b, phantom-c; did you mean 'phantom-a'?",
+            "specimens = { phantoms = [\"phantom-e\"] }§",
+            "variation.specimens.phantoms[0] is 'phantom-e'; the phantoms are: phantom-a, phantom-b, phantom-c, phantom-d; did you mean 'phantom-a'?",
         ),
         Case(
             "tilt_deg = { within = 1.0 }",
@@ -292,7 +292,7 @@ fn names() {
         Case(
             "phantom = \"phantom-a\"",
             "phantom = \"phantom-q\"§",
-            "specimen.phantom is 'phantom-q'; the phantoms are: phantom-a, phantom-b, phantom-c; did you mean 'phantom-a'?",
+            "specimen.phantom is 'phantom-q'; the phantoms are: phantom-a, phantom-b, phantom-c, phantom-d; did you mean 'phantom-a'?",
         ),
         Case(
             "phantom = \"phantom-a\" ",
@@ -487,7 +487,7 @@ fn files() {
     );
     assert_eq!(read(&[0xff, 0xfe]), "/scene.toml: stream did not contain valid UTF-8");
     assert_eq!(read(b""), "/scene.toml: line 1: missing field `name`");
-    let unknown = "no scene 'cell-d'; it must be a TOML file or one of the built-in scenes cell-a, cell-a-retraction, cell-a-stretch, cell-a-bowel, cell-b, cell-b-resection, cell-c, cell-c-resection; \
+    let unknown = "no scene 'cell-d'; it must be a TOML file or one of the built-in scenes cell-a, cell-a-retraction, cell-a-stretch, cell-a-bowel, cell-b, cell-b-resection, cell-c, cell-c-resection, cell-d-retraction; \
                    did you mean 'cell-a'?";
     assert_eq!(Scene::read("cell-d").unwrap_err().to_string(), unknown);
     let absent = Scene::read("absent/scene.toml").unwrap_err().to_string();

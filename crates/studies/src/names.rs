@@ -7,6 +7,7 @@ use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
 use trocar_scene::{GraspDesignName, ScheduleName};
 use trocar_specimen::Specimen;
+use trocar_workflow::paper::TABLE_I;
 use trocar_workflow::phantoms;
 
 /// Parses a length in millimetres; returns metres.
@@ -24,9 +25,13 @@ pub(crate) fn degrees(text: &str) -> std::result::Result<f64, std::num::ParseFlo
     text.parse::<f64>().map(f64::to_radians)
 }
 
-/// The named phantoms; all if none is named.
-pub(crate) fn phantoms_or_all(named: &[String]) -> Vec<String> {
-    if named.is_empty() { trocar_phantom::NAMES.iter().map(|n| (*n).to_owned()).collect() } else { named.to_vec() }
+/// The named phantoms; those that stand for the paper's specimens if none is named.
+pub(crate) fn phantoms_or_papers(named: &[String]) -> Vec<String> {
+    if !named.is_empty() {
+        return named.to_vec();
+    }
+    let in_table = |name: &&str| TABLE_I.iter().any(|row| row.phantom == *name);
+    trocar_phantom::NAMES.into_iter().filter(in_table).map(str::to_owned).collect()
 }
 
 /// How phantoms are recorded.

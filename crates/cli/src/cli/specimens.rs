@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub struct Specimens {
-    /// The phantom: phantom-a, phantom-b or phantom-c.
+    /// The phantom: phantom-a, phantom-b, phantom-c or phantom-d.
     pub phantom: String,
     /// Number of anatomies; each has the seed after the one before.
     #[arg(long, default_value_t = 8)]

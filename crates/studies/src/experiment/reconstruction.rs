@@ -1,7 +1,7 @@
 //! Table I and Fig. 6(a): all phantoms recorded, reconstructed with one set of settings, and
 //! compared with their truth.
 
-use crate::names::{BackName, MesherName, Recorded, SensorName, phantoms_or_all};
+use crate::names::{BackName, MesherName, Recorded, SensorName, phantoms_or_papers};
 use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
@@ -27,7 +27,7 @@ use trocar_workflow::{CompositeFigures, reconstruct_recording};
 /// Table I and Fig. 6(a): all phantoms recorded, reconstructed and compared with their truth.
 #[derive(Clone, Debug, Args)]
 pub struct ReconstructionExperiment {
-    /// Phantoms; all by default.
+    /// Phantoms; phantom-a, phantom-b and phantom-c by default.
     #[arg(long = "phantom")]
     pub phantoms: Vec<String>,
     /// How they are recorded.
@@ -125,7 +125,7 @@ impl Study for ReconstructionExperiment {
         let settings = Settings { back: self.back.into(), mesher: self.mesher.into(), ..Settings::default() };
         let mut result = ReconstructionResult { organs: Vec::new(), phantoms: Vec::new() };
         let mut reconstructions = Vec::new();
-        for phantom in &phantoms_or_all(&self.phantoms) {
+        for phantom in &phantoms_or_papers(&self.phantoms) {
             let folder = job.output().join(phantom);
             let recording = folder.join("recording");
             recorded(phantom, &record, &recording, job.progress)?;

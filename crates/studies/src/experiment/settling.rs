@@ -1,7 +1,7 @@
 //! Fig. 6(c): phantoms A, B and C released in the cell, and their speed after one second.
 
 use crate::Result;
-use crate::names::{Recorded, SolverName, phantoms_or_all};
+use crate::names::{Recorded, SolverName, phantoms_or_papers};
 use crate::study::{Job, Kind, Study};
 use clap::Args;
 use serde::Serialize;
@@ -30,7 +30,7 @@ const PAPER: [(&str, f64, f64); 3] =
 /// Fig. 6(c): how fast phantoms A, B and C come to rest in the cell.
 #[derive(Clone, Debug, Args)]
 pub struct SettlingExperiment {
-    /// Phantoms; all by default.
+    /// Phantoms; phantom-a, phantom-b and phantom-c by default.
     #[arg(long = "phantom")]
     pub phantoms: Vec<String>,
     /// The solver.
@@ -107,7 +107,7 @@ impl Study for SettlingExperiment {
     fn run(&self, job: &Job<'_>) -> Result<(SettlingResult, Document)> {
         let schedule = solver_named(self.schedule.name())?;
         job.claim()?;
-        let named = phantoms_or_all(&self.phantoms);
+        let named = phantoms_or_papers(&self.phantoms);
         let mut rows = Vec::with_capacity(named.len());
         for phantom in &named {
             let specimen =

@@ -16,7 +16,7 @@ pub use measure::SimilarityRow;
 pub use result::SimilarityResult;
 
 use crate::Result;
-use crate::names::{Recorded, phantoms_or_all};
+use crate::names::{Recorded, phantoms_or_papers};
 use crate::study::{Job, Kind, Study};
 use clap::Args;
 use measure::{Sides, SimilarityPictures, first_frames, labelled, measure};
@@ -34,7 +34,7 @@ use trocar_workflow::{check_interrupted, reconstruct_recording};
 /// through the endoscope.
 #[derive(Clone, Debug, Args)]
 pub struct SimilarityExperiment {
-    /// Phantoms; all by default. The first is also recorded from the side.
+    /// Phantoms; phantom-a, phantom-b and phantom-c by default. The first is also recorded from the side.
     #[arg(long = "phantom")]
     pub phantoms: Vec<String>,
     /// How they are recorded.
@@ -58,7 +58,7 @@ impl Study for SimilarityExperiment {
     fn run(&self, job: &Job<'_>) -> Result<(SimilarityResult, Document)> {
         job.claim()?;
         let (output, progress) = (job.output(), job.progress);
-        let phantoms = phantoms_or_all(&self.phantoms);
+        let phantoms = phantoms_or_papers(&self.phantoms);
         let (mut rows, mut oblique, mut skipped) = (Vec::new(), Vec::new(), Vec::new());
         for phantom in &phantoms {
             let folder = output.join(phantom);
