@@ -24,7 +24,7 @@ const FOLD: f64 = 5.0 / 3.0;
 /// Force on the blades (N) with which a fold of soft tissue bears its weight. Jaws that feel less
 /// close on until they feel it, in steps of this opening a period. Jaws that stop for 0.1 s take
 /// hold, and shorter steps would be stops.
-const BEARS: f64 = 0.25;
+const BEARS: f64 = 0.18;
 const FOLD_STEP: f64 = 0.06;
 
 /// Change of the opening after which jaws take hold where they stop.
