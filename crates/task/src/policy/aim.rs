@@ -30,7 +30,9 @@ const DIP: f64 = 0.0035;
 const PINCH: f64 = 0.7;
 
 /// Tissue wider than this (m) is so flat between the blades that they have to gather a fold of it:
-/// they go deeper by this share of the excess, and open in proportion to the width.
+/// they go deeper by this share of the excess, and open in proportion to the width. They come along
+/// the line from the port to the middle of the organ. There both blades meet the tissue at the same
+/// slope; beside it one of them would lie flat on it, and the other pierce its flank.
 const FLAT: f64 = 0.020;
 const DEEPER: f64 = 0.5;
 
@@ -156,9 +158,14 @@ pub(super) fn grasp(cell: &Cell, arm: &str, body: usize, (place, manner): (Place
         let name = cell.world().model.bodies()[body].name();
         return Err(Error::Option(format!("organ '{name}' has no free node to grasp: all are pinned; pin fewer")));
     };
-    let point = cluster.centroid(cell.world(), body);
-    let x = cell.workspace(arm)?.direction_to(point);
-    let (width, height) = width_and_height(cell, body, cluster.s, x, point);
+    let towards = |point: DVec3| -> Result<(DVec3, (f64, f64))> {
+        let x = cell.workspace(arm)?.direction_to(point);
+        Ok((point, width_and_height(cell, body, cluster.s, x, point)))
+    };
+    let (mut point, (mut width, mut height)) = towards(cluster.centroid(cell.world(), body))?;
+    if let Some(middle) = middle(cell, body, cluster.s).filter(|_| width > FLAT) {
+        (point, (width, height)) = towards(middle)?;
+    }
     let fits = width <= WIDE && manner == Manner::Fitting;
     let folds = width > FLAT;
     let (depth, jaw) = match (fits, folds) {

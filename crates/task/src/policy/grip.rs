@@ -17,9 +17,18 @@ const SHARES: [f64; 2] = [0.2, 0.5];
 /// of either hold nothing.
 const LEAST_OPENING: f64 = 0.15;
 
-/// Wide tissue is pressed to this part of that share, because most of the fold lies beside the
-/// blades.
-const FOLD: f64 = 0.5;
+/// A fold of wide tissue is pressed to this multiple of that share: jaws that close further on it
+/// push their tips through the surface beside it.
+const FOLD: f64 = 5.0 / 3.0;
+
+/// Force on the blades (N) with which a fold of soft tissue bears its weight. Jaws that feel less
+/// close on until they feel it, in steps of this opening a period. Jaws that stop for 0.1 s take
+/// hold, and shorter steps would be stops.
+const BEARS: f64 = 0.18;
+const FOLD_STEP: f64 = 0.06;
+
+/// Change of the opening after which jaws take hold where they stop.
+const LEAST_MOTION: f64 = 0.005;
 
 /// Change of the share for the next grasp: after tissue slipped or was missed, and after it was
 /// strained too much.
@@ -34,18 +43,20 @@ pub(super) struct Grip {
     folds: bool,
     /// Opening at which this closing met something.
     touched: Option<f64>,
+    /// Opening at which it has gathered a fold that bears the weight.
+    gathered: Option<f64>,
 }
 
 impl Default for Grip {
     fn default() -> Self {
-        Self { share: SHARE, folds: false, touched: None }
+        Self { share: SHARE, folds: false, touched: None, gathered: None }
     }
 }
 
 impl Grip {
     /// A closing begins, round tissue or, if it `folds`, on a fold of it.
     pub fn begin(&mut self, folds: bool) {
-        (self.touched, self.folds) = (None, folds);
+        (self.touched, self.gathered, self.folds) = (None, None, folds);
     }
 
     /// The opening to ask for, of jaws that are open by `opening` and pushed apart with `force`
@@ -54,8 +65,23 @@ impl Grip {
         if self.touched.is_none() && force > TOUCH {
             self.touched = Some(opening);
         }
-        let share = if self.folds { FOLD * self.share } else { self.share };
-        self.touched.map_or(0.0, |touched| (share * touched).max(LEAST_OPENING).min(opening))
+        let Some(touched) = self.touched else { return 0.0 };
+        if self.folds {
+            return self.fold(touched, opening, force);
+        }
+        (self.share * touched).max(LEAST_OPENING).min(opening)
+    }
+
+    /// The opening to ask for on a fold.
+    fn fold(&mut self, touched: f64, opening: f64, force: f64) -> f64 {
+        let least = (FOLD * self.share * touched).max(LEAST_OPENING);
+        // After tissue was strained, the share is larger and the force smaller.
+        let bears = force >= BEARS * SHARE / self.share;
+        if self.gathered.is_none() && opening <= least + FOLD_STEP && bears {
+            // Jaws take hold only where they come to by closing.
+            self.gathered = Some((opening - LEAST_MOTION).min(least).max(LEAST_OPENING));
+        }
+        self.gathered.unwrap_or_else(|| if opening > least { least } else { (opening - FOLD_STEP).max(LEAST_OPENING) })
     }
 
     /// What was held slipped: tighter next time.
@@ -98,6 +124,34 @@ mod tests {
         assert!((soft.1 / softer.1 - 4.0).abs() < 0.3, "force in proportion to stiffness: {soft:?} {softer:?}");
         let stiff = close(&mut Grip::default(), 10.0);
         assert!((stiff.1 - 0.5).abs() < 1e-9 && stiff.0 > 0.5, "all the force: {stiff:?}");
+    }
+
+    /// Closes at full speed on a fold of `stiffness` (N per opening) that fills the open jaws: the
+    /// opening, the force, and the longest stop on the way (periods).
+    fn gather(stiffness: f64) -> (f64, f64, usize) {
+        let mut grip = Grip::default();
+        grip.begin(true);
+        let force = |opening: f64| stiffness * (1.02 - opening).max(0.0);
+        let (mut opening, mut stops, mut longest): (f64, usize, usize) = (1.0, 0, 0);
+        for _ in 0..40 {
+            let wanted = grip.opening(opening, force(opening));
+            // Two frames of tissue; a stop is a frame that ends where the jaws are to be.
+            for _ in 0..2 {
+                opening = (opening - 1.0 / 18.0).max(wanted);
+                stops = if opening == wanted { stops + 1 } else { 0 };
+            }
+            longest = if grip.gathered.is_none() { longest.max(stops) } else { longest };
+        }
+        (opening, force(opening), longest)
+    }
+
+    #[test]
+    fn a_fold_is_pressed_to_half_and_soft_tissue_until_it_bears_its_weight() {
+        let (stiff, soft, softest) = (gather(2.0), gather(0.35), gather(0.1));
+        assert!((stiff.0 - 0.5).abs() < 0.01, "{stiff:?}");
+        assert!(soft.0 < 0.4 && (BEARS..1.3 * BEARS).contains(&soft.1), "{soft:?}");
+        assert!((softest.0 - LEAST_OPENING).abs() < 1e-9, "no further: {softest:?}");
+        assert!(stiff.2.max(soft.2) < 6, "the jaws took hold on the way: {stiff:?} {soft:?}");
     }
 
     #[test]
