@@ -4,9 +4,9 @@
     python examples/python/record_demonstrations.py --episodes 2 -o lifts
 
 The dataset has LeRobot's layout v3.0 (`--version v2.1` for the older one). It is safe to stop at
-any time: the same command continues. `--noise 0.5` disturbs what the arm does, but records what the
-controller wanted: the dataset then shows how to come back from mistakes, which a cloned policy
-makes (Laskey et al. 2017, DART).
+any time: the same command continues. `--keep 200` stops once 200 have passed. `--noise 0.5`
+disturbs what the arm does, but records what the controller wanted: the dataset then shows how to
+come back from mistakes, which a cloned policy makes (Laskey et al. 2017, DART).
 """
 
 import argparse
@@ -72,8 +72,8 @@ def continued(log: Path, kept: int) -> list[tuple[int, bool]]:
     return done
 
 
-def record(options: argparse.Namespace) -> int:
-    """Records the scripted controller's episodes that pass. Returns their number."""
+def record(options: argparse.Namespace) -> list[tuple[int, bool]]:
+    """Records the scripted controller's episodes that pass. Returns all seeds, and which passed."""
     env = gym.make(
         "trocar/GraspLift-v0",
         scene=options.scene,
@@ -92,6 +92,8 @@ def record(options: argparse.Namespace) -> int:
     recorder = Recorder(Disturbed(env, options.noise), writer, only_successful=True)
     expert = trocar.Policy("scripted")
     for seed in range(len(done), options.episodes):
+        if options.keep and sum(passed for _, passed in done) >= options.keep:
+            break
         recorder.reset(seed=seed)
         expert.reset(env)
         over = False
@@ -99,14 +101,17 @@ def record(options: argparse.Namespace) -> int:
             _, _, ended, late, info = recorder.step(expert(env))
             over = ended or late
         done.append((seed, bool(info["is_success"])))
-        log.write_text(json.dumps(done))
+        written = log.with_name(f"{log.name}.partial")
+        written.write_text(json.dumps(done))
+        written.replace(log)
         print(f"seed {seed}: {info['end']} after {info['time_s']:.1f} s", flush=True)
-    return sum(passed for _, passed in done)
+    return done
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--episodes", type=int, default=2)
+    parser.add_argument("--episodes", type=int, default=2, help="most episodes that are run")
+    parser.add_argument("--keep", type=int, help="stop once this many have passed (default: never)")
     parser.add_argument("--scene", default="cell-a", help="a built-in scene or a file")
     parser.add_argument("--cameras", nargs="+", help="(default: all but the recording camera)")
     parser.add_argument("--size", type=int, default=224, help="edge of the pictures (px)")
@@ -127,8 +132,9 @@ def main() -> None:
     parser.add_argument("--version", default="v3.0", choices=["v3.0", "v2.1"])
     parser.add_argument("-o", "--output", type=Path, default=Path("lifts"))
     options = parser.parse_args()
-    passed = record(options)
-    print(f"{passed} of {options.episodes} passed and are kept")
+    done = record(options)
+    passed = sum(passed for _, passed in done)
+    print(f"{passed} of {len(done)} passed and are kept")
     if not passed:
         return
     info = json.loads((options.output / "meta/info.json").read_text())

@@ -1,8 +1,9 @@
 """Behaviour cloning on GraspLift from endoscope pictures, where every episode varies.
 
     pip install '.[datasets,policies]' torch matplotlib
-    python examples/python/record_demonstrations.py --episodes 200 --size 84 --noise 0.5 \
-        --scene examples/python/lift_from_pictures.toml --variation standard -o lifts
+    python examples/python/record_demonstrations.py --episodes 300 --keep 200 --seconds 9 \
+        --size 84 --noise 0.5 --scene examples/python/lift_from_pictures.toml \
+        --variation standard -o lifts
     python examples/python/train_from_pictures.py lifts -o cloned
     python examples/python/train_from_pictures.py lifts -o cloned --observe states
     trocar evaluate examples/python/lift_from_pictures.toml --split unseen --episodes 20 \

@@ -70,6 +70,15 @@ def test_recording_is_continued_and_leaves_the_noise_out_of_the_actions(dataset)
     assert info["total_episodes"] == sum(passed for _, passed in seeds) > 0
 
 
+def test_recording_stops_once_enough_have_passed(dataset):
+    log = dataset.with_name("lifts.seeds.json")
+    before = log.read_text()
+    words = ["--cameras", "endoscope", "--size", 32, "--noise", 0.3, "--seconds", 9]
+    told = run("record_demonstrations.py", "--episodes", 9, "--keep", 1, *words, "-o", dataset)
+    assert log.read_text() == before
+    assert "of 2 passed" in told
+
+
 @pytest.mark.parametrize("observe", ["pictures", "states"])
 def test_the_loss_on_held_out_frames_falls(cloned, observe):
     rows = np.loadtxt(cloned / f"{observe}_0.csv", delimiter=",")
