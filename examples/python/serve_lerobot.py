@@ -8,9 +8,9 @@
         --policy act=ws://127.0.0.1:8000
 
 The dataset is one of `record_demonstrations.py`. The pictures of the scene must have the size of
-those of the dataset. ACT begins from downloaded weights; without
-them (`--policy.pretrained_backbone_weights=null`) it learned nothing until `--policy.pre_norm=true`
-was added (docs/measurements/learning.md).
+those of the dataset. ACT begins from downloaded weights; without them
+(`--policy.pretrained_backbone_weights=null`) it hardly learned until `--policy.pre_norm=true` was
+added (docs/measurements/learning.md).
 """
 
 import argparse
