@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn a_fold_is_pressed_to_half_and_soft_tissue_until_it_bears_its_weight() {
-        let (stiff, soft, softest) = (gather(2.0), gather(0.35), gather(0.1));
+        let (stiff, soft, softest) = (gather(2.0), gather(0.25), gather(0.1));
         assert!((stiff.0 - 0.5).abs() < 0.01, "{stiff:?}");
         assert!(soft.0 < 0.4 && (BEARS..1.3 * BEARS).contains(&soft.1), "{soft:?}");
         assert!((softest.0 - LEAST_OPENING).abs() < 1e-9, "no further: {softest:?}");
