@@ -8,7 +8,7 @@ use trocar_recording::{RecordingInfo, RecordingWriter};
 /// The mug from the tests of pyk4a: a colour and a depth frame of an Azure Kinect, from the side.
 pub(super) const MUG: &str = "k4a_mug";
 
-const DESCRIPTION: &str = include_str!("../../../../../examples/recordings/k4a_mug_color.toml");
+const DESCRIPTION: &str = include_str!("k4a_mug_color.toml");
 
 /// Writes the recording of the mug from the frames in `data`; returns false if they are missing.
 pub(super) fn prepare_mug(data: &Path, recording: &Path) -> Result<bool> {
