@@ -19,8 +19,8 @@ fn taken(viewer: &Shared) -> Option<Follower> {
 pub struct Viewers(Vec<(usize, Shared)>);
 
 impl Viewers {
-    /// Shows the cells that `changed` says. What cannot be shown ends its viewer, and is told as a
-    /// warning: it is no error of the step.
+    /// Shows the cells that have `changed`. A cell that cannot be shown ends its viewer with a
+    /// warning. The step itself does not fail.
     pub fn see(
         &mut self,
         py: Python<'_>,

@@ -69,7 +69,7 @@ pub(crate) struct Hub {
 }
 
 impl Hub {
-    /// Of clients that may drive what they have the seats of.
+    /// A hub whose clients may drive what they hold the seats of.
     pub fn new() -> Self {
         Self {
             watched: None,
@@ -82,7 +82,7 @@ impl Hub {
         }
     }
 
-    /// Of clients that only watch, and are told `why`.
+    /// A hub whose clients only watch; `why` is the answer if they try to drive.
     pub fn watched(why: &'static str) -> Self {
         Self { watched: Some(why), ..Self::new() }
     }

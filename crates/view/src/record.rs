@@ -85,7 +85,7 @@ impl Recorder {
     }
 }
 
-/// Who moved an arm in each period, as numbers: 0 the policy, 1 the operator, 2 nobody.
+/// Who moved an arm in each period, as a number: 0 is the policy, 1 the operator, 2 nobody.
 fn actor_column(arm: ArmName, actors: &[[Actor; 2]]) -> Column {
     let values = actors.iter().map(|both| f64::from(both[arm as usize] as u8)).collect();
     Column { name: format!("{}_actor", arm.name()), values }

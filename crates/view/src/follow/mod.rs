@@ -27,7 +27,7 @@ use watchers::Known;
 const WATCHED: &str = "the environment's own program steps it; clients watch";
 /// Who moves the arms.
 const ACTOR: &str = "environment";
-/// Time between states that are kept for whoever comes, while nobody watches.
+/// Time between the states that are kept for the next client while nobody watches.
 const UNWATCHED_EVERY: Duration = Duration::from_millis(100);
 
 /// A running viewer of an episode of another program. It stops when it is dropped; in a child made by
@@ -121,7 +121,7 @@ impl Drop for Follower {
     fn drop(&mut self) {
         let inner = self.inner.take();
         if self.process != std::process::id() {
-            // The threads are the parent's: waiting for them here would be for ever.
+            // The threads belong to the parent. Waiting for them here would never end.
             std::mem::forget(inner);
         }
     }
@@ -151,7 +151,7 @@ impl Inner {
         Ok(())
     }
 
-    /// Tells of what happened since the last step.
+    /// Sends the events since the last step to all clients.
     fn tell_events(&mut self, episode: &Episode, fresh: bool) {
         let all = episode.events();
         if !fresh {

@@ -45,7 +45,7 @@ pub(super) struct Known {
     status: Value,
     stepped: Option<Instant>,
     pace: Pace,
-    /// The newest state, if nobody was due to get it.
+    /// The newest state, if no client was due to get it.
     pub parked: Option<Snapshot>,
     pub pictures: Vec<Asked>,
 }
