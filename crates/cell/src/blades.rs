@@ -71,6 +71,13 @@ impl Default for Blades {
     }
 }
 
+impl Blades {
+    /// Distance from the pivot to the middle of the blades (m): where forces of the jaws act.
+    pub fn lever(&self) -> f64 {
+        0.5 * (JAW_REGION_BEGIN + self.length)
+    }
+}
+
 /// Distance at which tissue rests on an instrument's tip (m).
 pub const REST_OFFSET: f64 = 0.0015;
 

@@ -1,14 +1,14 @@
 //! Scissors: when closing blades cut, and what they cut.
 //!
 //! A cutter's blades move like the gripper's. The cut lies in the plane between the blades, over
-//! their length and as wide as they were open. A tube across the blades is cut through if its whole
-//! cross-section is between them, else in part. The cutting edges have no width: they push no
-//! tissue.
+//! their length and as wide as they were open; it opens as far as the edges have come. A tube across
+//! the blades is cut through if its whole cross-section is between them, else in part. The cutting
+//! edges have no width: they push no tissue.
 
 use crate::gripper::{BLADE_TIP, JAW_REGION_BEGIN};
 use crate::{Gripper, Result, World};
 use glam::DVec3;
-use trocar_tissue::{Cut, Piece, sever};
+use trocar_tissue::{Cut, Piece, sever_part};
 
 /// Blades that were open wider than this (rad) are ready to cut ...
 pub const CUT_OPENED: f64 = 0.50;
@@ -98,12 +98,21 @@ impl World {
     /// # Errors
     /// An invalid cut, or pieces that cannot be stepped.
     pub fn sever(&mut self, cut: &Cut) -> Result<Vec<Piece>> {
-        let severed = sever(&self.model, &self.state, cut)?;
+        self.sever_part(cut, [f64::NEG_INFINITY, f64::INFINITY])
+    }
+
+    /// The same for a part of the cut's rectangle: from and to, along the blades from its middle
+    /// (m).
+    ///
+    /// # Errors
+    /// As [`World::sever`].
+    pub fn sever_part(&mut self, cut: &Cut, part: [f64; 2]) -> Result<Vec<Piece>> {
+        let severed = sever_part(&self.model, &self.state, cut, part)?;
         if severed.faces == 0 {
             return Ok(Vec::new());
         }
         self.stepper.set_model(&severed.model)?;
-        let whole = self.axes[cut.body].clone();
+        let (whole, toughness) = (self.axes[cut.body].clone(), self.toughness[cut.body]);
         for piece in &severed.pieces {
             let mut axis = whole.clone();
             axis.s = piece.nodes.iter().map(|node| whole.s[*node as usize]).collect();
@@ -111,6 +120,7 @@ impl World {
                 self.axes[piece.body] = axis;
             } else {
                 self.axes.push(axis);
+                self.toughness.push(toughness);
             }
         }
         (self.model, self.state) = (severed.model, severed.state);

@@ -4,6 +4,7 @@
 //! in the cell frame: it takes actions and reports observations. Its arms are driven by their
 //! dynamics through ports, where tissue loads them, or are ideal and go where they are commanded.
 
+mod bite;
 pub mod blades;
 mod cell;
 mod clusters;
@@ -15,6 +16,7 @@ mod gripper;
 mod hold;
 mod jaw;
 mod jaw_region;
+mod section;
 mod severance;
 mod target;
 mod world;

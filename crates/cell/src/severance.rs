@@ -1,8 +1,9 @@
-//! Figures of a cut that severs an organ.
+//! An organ that blades part, a part of the way at a time, and figures of the cut.
 
 use crate::{Gripper, JawRegion, World};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 use trocar_geometry::TetMesh;
 use trocar_tissue::Piece;
 
@@ -32,6 +33,16 @@ pub struct Severance {
     pub faces: usize,
     /// Their area, of one side (mm2).
     pub area_mm2: f64,
+    /// Their area projected on the plane of the cut (mm2): that of the section, because faces
+    /// zigzag.
+    #[serde(default)]
+    pub section_mm2: f64,
+    /// Work of the jaws (mJ).
+    #[serde(default)]
+    pub work_mj: f64,
+    /// The largest force of tissue on the blades, at their middle (N).
+    #[serde(default)]
+    pub force_peak_n: f64,
     /// New nodes: copies of those on the cut.
     pub copies: usize,
     /// The pieces: the one that remains the organ, then the loose ones. Empty if nothing was cut.
@@ -75,15 +86,35 @@ pub struct SeveredPiece {
     pub rise_mm: f64,
 }
 
-/// An organ just before it is cut.
-pub(crate) struct BeforeCut {
+/// An organ that blades are parting.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Parting {
+    before: Arc<BeforeCut>,
+    /// The part of the blades along which it is open: distances from the pivot (m).
+    pub part: [f64; 2],
+    /// The organ in its pieces, if anything is open.
+    pub pieces: Vec<Piece>,
+    /// The figures when it parted last.
+    pub figures: Severance,
+    /// Number of faces that events told of.
+    pub told: Option<usize>,
+}
+
+/// An organ before it is cut.
+#[derive(Debug, Default)]
+struct BeforeCut {
     organ: usize,
-    mesh: TetMesh,
+    tets: Vec<[u32; 4]>,
     /// Organ coordinates of its nodes.
     s: Vec<f64>,
     opened: f64,
     between_blades: f64,
+    /// Normal of the cut.
+    normal: DVec3,
 }
+
+/// Volumes of the organ's elements (m3), negative where they are inverted.
+type Volumes = Vec<f64>;
 
 /// An organ in its pieces. Its nodes are numbered through the pieces, one after the other; its
 /// elements keep the order of the whole organ.
@@ -97,34 +128,77 @@ struct CutMesh {
     faces: Vec<[u32; 3]>,
 }
 
-impl Severance {
-    /// Organ `organ` before the open blades of `open` cut it.
-    pub(crate) fn before(world: &World, organ: usize, open: &Gripper) -> BeforeCut {
-        let tets = world.model.bodies()[organ].tets().to_vec();
-        BeforeCut {
+impl Parting {
+    /// Body `organ` before the open blades of `open` cut it.
+    pub fn new(world: &World, organ: usize, open: &Gripper) -> Self {
+        let before = BeforeCut {
             organ,
-            mesh: TetMesh { vertices: world.state.positions(&world.model, organ), tets },
+            tets: world.model.bodies()[organ].tets().to_vec(),
             s: world.axes[organ].s.clone(),
             opened: open.jaw_angle,
             between_blades: JawRegion::of(open).tissue_of(world, organ).map_or(0.0, |tissue| tissue.volume),
+            normal: open.pose.rotation * DVec3::Z,
+        };
+        let part = [f64::INFINITY, f64::NEG_INFINITY];
+        Self { before: Arc::new(before), part, pieces: Vec::new(), figures: Severance::default(), told: None }
+    }
+
+    /// Volumes of the organ's elements now (m3).
+    pub fn volumes(&self, world: &World) -> Volumes {
+        let organ = self.before.organ;
+        let mesh = match self.pieces.is_empty() {
+            true => TetMesh { vertices: world.state.positions(&world.model, organ), tets: self.before.tets.clone() },
+            false => CutMesh::new(&self.before.tets, &self.pieces, world).mesh,
+        };
+        volumes(&mesh)
+    }
+
+    /// Follows a further cut of the organ into `pieces`, at once. `volumes` were those of its
+    /// elements before; `held` are bodies and numbers of nodes in jaws.
+    pub fn follow(&mut self, world: &World, pieces: &[Piece], volumes: &Volumes, held: &[(usize, usize)]) {
+        if let Some(at) = self.pieces.iter().position(|piece| piece.body == self.before.organ && !pieces.is_empty()) {
+            let whole = self.pieces.remove(at);
+            let of = |from: &[u32], to: &[u32]| to.iter().map(|i| from[*i as usize]).collect();
+            let cut = pieces.iter().map(|piece| Piece {
+                body: piece.body,
+                nodes: of(&whole.nodes, &piece.nodes),
+                elements: of(&whole.elements, &piece.elements),
+            });
+            self.pieces.extend(cut);
+            self.pieces.sort_by_key(|piece| piece.body);
+        } else if self.pieces.is_empty() {
+            self.pieces = pieces.to_vec();
         }
+        self.figures = self.before.after(world, &self.pieces, volumes, held);
+    }
+
+    /// The numbers of its state; the tissue is the world's.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
+        let Self { before, part, pieces, figures, told } = self;
+        let told = told.map_or(-1.0, |told| told as f64);
+        let own = [before.organ as f64, before.opened, part[0], part[1], told];
+        own.into_iter().chain([pieces.len() as f64, figures.area_mm2])
     }
 }
 
+/// Volumes of the elements of `mesh` (m3).
+fn volumes(mesh: &TetMesh) -> Volumes {
+    (0..mesh.tets.len()).map(|t| mesh.tet_volume(t)).collect()
+}
+
 impl BeforeCut {
-    /// The figures once the organ is in `pieces`; `held` are bodies and numbers of nodes in jaws,
-    /// and `closed` (rad) is the angle at which the blades cut.
-    pub(crate) fn after(self, world: &World, pieces: &[Piece], held: &[(usize, usize)], closed: f64) -> Severance {
-        let (volume, inverted) = (1e9 * self.mesh.volume(), self.mesh.inverted());
+    /// The figures once the organ, whose elements had the volumes `were`, is in `pieces`.
+    fn after(&self, world: &World, pieces: &[Piece], were: &Volumes, held: &[(usize, usize)]) -> Severance {
+        let inverted = |volumes: &Volumes| volumes.iter().filter(|v| **v <= 0.0).count();
+        let volume = 1e9 * were.iter().sum::<f64>();
         let mut figures = Severance {
             outcome: "no tissue".to_owned(),
             opened_rad: self.opened,
-            closed_rad: closed,
             between_blades_mm3: 1e9 * self.between_blades,
             volume_before_mm3: volume,
             volume_after_mm3: volume,
-            inverted_before: inverted,
-            inverted_after: inverted,
+            inverted_before: inverted(were),
+            inverted_after: inverted(were),
             ..Severance::default()
         };
         let name = world.model.bodies()[self.organ].name();
@@ -133,18 +207,20 @@ impl BeforeCut {
                 format!("the blades closed on the {name} and nothing was cut: too little of it lies beyond them");
             return figures;
         }
-        let cut = CutMesh::new(&self.mesh.tets, pieces, world);
+        let cut = CutMesh::new(&self.tets, pieces, world);
+        let are = volumes(&cut.mesh);
         let area = |face: &[u32; 3]| {
             let [a, b, c] = face.map(|i| cut.mesh.vertices[i as usize]);
-            0.5 * (b - a).cross(c - a).length()
+            0.5 * (b - a).cross(c - a)
         };
         figures.faces = cut.faces.len() / 2;
-        figures.area_mm2 = 0.5e6 * cut.faces.iter().map(area).sum::<f64>();
-        figures.copies = cut.parents.len() - self.mesh.vertices.len();
+        figures.area_mm2 = 0.5e6 * cut.faces.iter().map(|face| area(face).length()).sum::<f64>();
+        figures.section_mm2 = 0.5e6 * cut.faces.iter().map(|face| area(face).dot(self.normal).abs()).sum::<f64>();
+        figures.copies = cut.parents.len() - self.s.len();
         self.place(&cut, &mut figures);
-        (figures.volume_after_mm3, figures.inverted_after) = (1e9 * cut.mesh.volume(), cut.mesh.inverted());
+        (figures.volume_after_mm3, figures.inverted_after) = (1e9 * are.iter().sum::<f64>(), inverted(&are));
         figures.volume_error = (figures.volume_after_mm3 / figures.volume_before_mm3 - 1.0).abs();
-        figures.pieces = pieces.iter().map(|piece| self.piece(world, piece, &cut, held)).collect();
+        figures.pieces = pieces.iter().map(|piece| self.piece(world, piece, [were, &are], held)).collect();
         let end = |best: fn(&f64, &f64) -> bool| {
             let s = &self.s;
             (0..s.len()).fold(0, |found, i| if best(&s[i], &s[found]) { i } else { found }) as u32
@@ -169,9 +245,9 @@ impl BeforeCut {
         figures.at_most = split.iter().copied().fold(0.0, f64::max);
     }
 
-    fn piece(&self, world: &World, piece: &Piece, cut: &CutMesh, held: &[(usize, usize)]) -> SeveredPiece {
+    fn piece(&self, world: &World, piece: &Piece, volumes: [&Volumes; 2], held: &[(usize, usize)]) -> SeveredPiece {
         let body = &world.model.bodies()[piece.body];
-        let volume = |mesh: &TetMesh| 1e9 * piece.elements.iter().map(|t| mesh.tet_volume(*t as usize)).sum::<f64>();
+        let volume = |of: &Volumes| 1e9 * piece.elements.iter().map(|t| of[*t as usize]).sum::<f64>();
         let along = || piece.nodes.iter().map(|i| self.s[*i as usize]);
         let nodes: Vec<u32> = (0..body.len() as u32).collect();
         SeveredPiece {
@@ -182,8 +258,8 @@ impl BeforeCut {
             held: held.iter().filter(|(body, _)| *body == piece.body).map(|(_, nodes)| nodes).sum(),
             s_from: along().fold(1.0, f64::min),
             s_to: along().fold(0.0, f64::max),
-            volume_before_mm3: volume(&self.mesh),
-            volume_after_mm3: volume(&cut.mesh),
+            volume_before_mm3: volume(volumes[0]),
+            volume_after_mm3: volume(volumes[1]),
             height_m: world.state.centroid(&world.model, piece.body, &nodes).dot(world.up),
             rise_mm: 0.0,
         }

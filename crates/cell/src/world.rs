@@ -3,6 +3,7 @@
 use crate::{Error, Result};
 use glam::DVec3;
 use trocar_geometry::{OrganAxis, TetQuality};
+use trocar_scene::TOUGHNESS;
 use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen};
 use trocar_tissue::{
     BodyContact, BodyDescription, Collider, ConstitutiveModel, Event, Load, Material, Model, ModelBuilder,
@@ -35,6 +36,8 @@ pub struct World {
     pub state: State,
     /// Axis and organ coordinates of each organ, in the specimen's order.
     pub axes: Vec<OrganAxis>,
+    /// Energy that a cut takes for the area that it opens, of each body (J/m2).
+    pub toughness: Vec<f64>,
     /// Unit vector against gravity.
     pub up: DVec3,
     pub(crate) stepper: Stepper,
@@ -55,6 +58,8 @@ pub struct Surroundings {
     pub bed_friction: Option<f64>,
     /// Organs without a bed, by their indices.
     pub floating: Vec<usize>,
+    /// Toughness of organs (J/m2), by their indices; [`TOUGHNESS`] of those that are left out.
+    pub toughness: Vec<f64>,
 }
 
 impl Default for Surroundings {
@@ -66,6 +71,7 @@ impl Default for Surroundings {
             filtered: Vec::new(),
             bed_friction: Some(SUPPORT_FRICTION),
             floating: Vec::new(),
+            toughness: Vec::new(),
         }
     }
 }
@@ -76,6 +82,7 @@ pub(crate) struct WorldState {
     model: Model,
     state: State,
     axes: Vec<OrganAxis>,
+    toughness: Vec<f64>,
     cuts: usize,
 }
 
@@ -140,7 +147,9 @@ impl World {
         let model = builder.build()?;
         let state = State::new(&model);
         let stepper = Stepper::new(&model, schedule, FRAME, threads)?;
-        Ok(Self { model, state, axes, up, stepper, cuts: 0 })
+        let mut toughness = surroundings.toughness.clone();
+        toughness.resize(axes.len(), TOUGHNESS);
+        Ok(Self { model, state, axes, toughness, up, stepper, cuts: 0 })
     }
 
     /// Forces of tissue on each tool in the last frame, in the order of the given motions. The list
@@ -157,8 +166,14 @@ impl World {
     /// A copy of everything that changes.
     pub(crate) fn save(&self) -> WorldState {
         // The upward direction never changes, and the stepper follows the model.
-        let Self { model, state, axes, up: _, stepper: _, cuts } = self;
-        WorldState { model: model.clone(), state: state.clone(), axes: axes.clone(), cuts: *cuts }
+        let Self { model, state, axes, toughness, up: _, stepper: _, cuts } = self;
+        WorldState {
+            model: model.clone(),
+            state: state.clone(),
+            axes: axes.clone(),
+            toughness: toughness.clone(),
+            cuts: *cuts,
+        }
     }
 
     /// Restores what [`World::save`] returned. The steps after it are the same to the bit.
@@ -173,6 +188,7 @@ impl World {
         self.model = saved.model.clone();
         self.state = saved.state.clone();
         self.axes.clone_from(&saved.axes);
+        self.toughness.clone_from(&saved.toughness);
         self.cuts = saved.cuts;
         Ok(())
     }

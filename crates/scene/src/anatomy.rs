@@ -10,6 +10,11 @@ use trocar_specimen::{End, Material, MaterialModel, Pins};
 /// Name of the ground under the organs in a filtered pair. No organ may have it.
 pub const FIELD: &str = "field";
 
+/// Energy that a cut takes for the area that it opens (J/m2), of organs for which the scene says
+/// nothing: that of pig aorta and lamina propria, more than of liver. Of bowel and appendix none is
+/// known (`docs/tissue-values.md`).
+pub const TOUGHNESS: f64 = 300.0;
+
 /// The specimen: a folder, or a built-in phantom. One of `path` and `phantom`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -158,6 +163,9 @@ pub struct MaterialOverride {
     /// Density (kg/m3); the paper's cell has 1200.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density_kg_m3: Option<f64>,
+    /// Toughness: the energy that a cut takes for the area that it opens (J/m2); 300 if left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub toughness_j_m2: Option<f64>,
 }
 
 /// The models by the names that the specimen's own format gives them.
@@ -167,7 +175,7 @@ fn material_models(_: &mut SchemaGenerator) -> Schema {
 }
 
 impl MaterialOverride {
-    /// The specimen's `material` with the scene's changes.
+    /// The specimen's `material` with the scene's changes. Toughness is no part of it.
     pub fn applied_to(&self, material: Material) -> Material {
         Material {
             model: self.model.unwrap_or(material.model),

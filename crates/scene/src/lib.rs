@@ -33,7 +33,7 @@ mod variation;
 
 pub use anatomy::{
     FIELD, MaterialOverride, OrganOverride, PinEnd, PinRule, ScheduleName, Source, SpecimenSource, Support,
-    SupportKind, Tissue, ToolContactKind,
+    SupportKind, TOUGHNESS, Tissue, ToolContactKind,
 };
 pub use builtin::{BUILTINS, Builtin};
 pub use camera::{CellCamera, Lens, View};

@@ -180,6 +180,11 @@ fn units() {
             "organ.cecum.material.density_kg_m3 is 1.2; it must be in [100, 30000] kg/m3; 1.2 g/cm3 is 1200 kg/m3",
         ),
         Case(
+            "[organ.cecum.pins]",
+            "[organ.cecum.material]\ntoughness_j_m2 = 0.3§\n[organ.cecum.pins]",
+            "organ.cecum.material.toughness_j_m2 is 0.3; it must be in [1, 20000] J/m2; 0.3 kJ/m2 is 300 J/m2",
+        ),
+        Case(
             "insertion_mm = 100.0",
             "insertion_mm = 0.07§ ",
             "arm[0].start.insertion_mm is 0.07; it must be in [21, 321] mm; 0.07 m is 70 mm",

@@ -129,10 +129,13 @@ impl Facts<'_> {
     }
 
     fn severed(&self) -> Option<Severed> {
-        let (time_s, cut) = self.events.iter().find_map(|(time, e)| match e {
+        let mut cuts = self.events.iter().filter_map(|(time, e)| match e {
             CellEvent::Cut { parted: Some(cut), .. } => Some((*time, cut)),
             _ => None,
-        })?;
+        });
+        // The first that severed; else how far they came.
+        let last = cuts.clone().last();
+        let (time_s, cut) = cuts.find(|(_, cut)| cut.outcome == "severed").or(last)?;
         let mut cut = Severance::clone(cut);
         for piece in &mut cut.pieces {
             let now = self.heights.iter().find(|(name, _)| *name == piece.name).map(|(_, height)| *height);

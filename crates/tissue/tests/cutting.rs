@@ -8,7 +8,7 @@ use trocar_geometry::TetMesh;
 use trocar_testing::blocks::{FRAME, GRAVITY, appendix, block, nodes, tissue};
 use trocar_tissue::{
     BodyDescription, Compliance, Cut, Grasp, MassFloor, Material, Model, ModelBuilder, Severed, SolverSettings, State,
-    Stepper, sever,
+    Stepper, sever, sever_part,
 };
 
 fn material() -> Material {
@@ -134,6 +134,26 @@ fn a_partial_cut_leaves_one_piece_that_opens_under_load() {
         run(&mut Stepper::new(&cut.model, schedule, FRAME, 1).unwrap(), &cut.model, &mut state, 60);
         let widest = (0..10).map(|k| gap(&state, k)).fold(0.0, f64::max);
         assert!(widest > 2e-4, "the notch is {widest} m wide");
+    }
+}
+
+#[test]
+fn parts_of_a_cut_meet() {
+    for (name, mesh, at) in organs() {
+        let model = one_body(&mesh, vec![]);
+        let cut = Cut { along: DVec3::Y, ..Cut::through(0, at * DVec3::X, DVec3::X) };
+        let whole = sever(&model, &State::new(&model), &cut).unwrap();
+        let (mut model, mut state, mut faces) = (model.clone(), State::new(&model), 0);
+        let ends = [f64::NEG_INFINITY, -1e-3, 0.0, 2e-3, f64::INFINITY];
+        for part in ends.windows(2) {
+            let severed = sever_part(&model, &state, &cut, [part[0], part[1]]).unwrap();
+            faces += severed.faces;
+            (model, state) = (severed.model, severed.state);
+        }
+        assert_eq!((model.bodies().len(), faces >= whole.faces), (whole.model.bodies().len(), true), "{name}");
+        for (a, b) in model.bodies().iter().zip(whole.model.bodies()) {
+            assert_eq!((a.len(), a.tets().len()), (b.len(), b.tets().len()), "{name}");
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use crate::{Error, Result, Surroundings};
 use glam::DVec3;
 use trocar_core::Pose;
 use trocar_geometry::OrganAxis;
-use trocar_scene::{FIELD, PinEnd, PinRule, Scene, SupportKind, ToolContactKind};
+use trocar_scene::{FIELD, PinEnd, PinRule, Scene, SupportKind, TOUGHNESS, ToolContactKind};
 use trocar_specimen::{End, Organ, Specimen};
 use trocar_tissue::{BodyContact, ToolContact};
 
@@ -52,10 +52,12 @@ impl Placed {
         for (name, change) in &scene.organs {
             changes.push((find(&|| format!("organ.{name}"), name)?, change));
         }
+        let mut toughness = vec![TOUGHNESS; placed.organs.len()];
         for (k, change) in changes {
             let far = far_end(scene, &placed.organs[k], change.pins.as_ref())?;
             let organ = &mut placed.organs[k];
             organ.material = change.material.applied_to(organ.material);
+            toughness[k] = change.material.toughness_j_m2.unwrap_or(TOUGHNESS);
             if let Some(rule) = &change.pins {
                 organ.pins = rule.pins(far);
             }
@@ -75,6 +77,7 @@ impl Placed {
             filtered,
             bed_friction: (support.kind == SupportKind::Imprint).then_some(support.friction),
             floating,
+            toughness,
         };
         let heights = placed.organs.iter().flat_map(|o| &o.body.vertices).map(|p| p.z);
         let floor = heights.fold(f64::INFINITY, f64::min);

@@ -151,7 +151,8 @@ pub enum CellEvent {
         /// Pull at which it tore (N).
         force_n: f64,
     },
-    /// A cutter closed through tissue.
+    /// A cutter has closed through tissue as far as it goes: through all of it, to the scene's gate,
+    /// or until it opens again.
     Cut {
         /// The arm.
         arm: Side,
@@ -159,6 +160,10 @@ pub enum CellEvent {
         organ: String,
         /// Number of pieces of the organ now; 1 in scenes that do not sever.
         pieces: usize,
+        /// Work of the jaws since they began to close through it (mJ).
+        work_mj: f64,
+        /// The largest force of tissue on the blades since then, at their middle (N).
+        force_peak_n: f64,
         /// Figures of the cut, in scenes that sever.
         #[serde(skip_serializing_if = "Option::is_none")]
         parted: Option<Box<Severance>>,
@@ -238,9 +243,9 @@ impl std::fmt::Display for CellEvent {
             Self::Torn { arm, force_n } => {
                 write!(f, "tissue tore out of the {} jaws at {force_n:.2} N", arm.name())
             }
-            Self::Cut { arm, organ, pieces, .. } => {
+            Self::Cut { arm, organ, pieces, work_mj, .. } => {
                 let into = if *pieces == 1 { "without parting it".to_owned() } else { format!("into {pieces} pieces") };
-                write!(f, "the {} blades closed through the {organ}, {into}", arm.name())
+                write!(f, "the {} blades cut the {organ} with {work_mj:.1} mJ, {into}", arm.name())
             }
             Self::ContactDisabled { arm, organ, stretch, volume } => write!(
                 f,

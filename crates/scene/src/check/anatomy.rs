@@ -82,6 +82,7 @@ fn material(at: &str, said: &MaterialOverride) -> Checked {
         ("young_modulus_pa", said.young_modulus_pa, 100.0..=1e9),
         ("poisson_ratio", said.poisson_ratio, 0.0..=0.4999),
         ("density_kg_m3", said.density_kg_m3, 100.0..=30_000.0),
+        ("toughness_j_m2", said.toughness_j_m2, 1.0..=20_000.0),
     ];
     for (key, value, range) in fields {
         if let Some(value) = value {

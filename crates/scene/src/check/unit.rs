@@ -8,8 +8,9 @@ type Unit = (&'static str, &'static str, Option<(&'static str, f64)>);
 
 /// Ends of keys with their units, longer ones first.
 #[rustfmt::skip]
-const UNITS: [Unit; 10] = [
+const UNITS: [Unit; 11] = [
     ("_kg_m3", "kg/m3", Some(("g/cm3", 1e3))),
+    ("_j_m2",  "J/m2",  Some(("kJ/m2", 1e3))),
     ("_mm",    "mm",    Some(("m", 1e3))),
     ("_deg",   "degrees", Some(("rad", 180.0 / std::f64::consts::PI))),
     ("_pa",    "Pa",    Some(("kPa", 1e3))),
@@ -87,6 +88,7 @@ mod tests {
             ("joint_friction_nm", "N m"),
             ("jaw_force_n", "N"),
             ("density_kg_m3", "kg/m3"),
+            ("toughness_j_m2", "J/m2"),
             ("jaw", ""),
             ("friction", ""),
         ] {

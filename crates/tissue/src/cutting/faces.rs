@@ -21,14 +21,21 @@ pub(super) struct Opened {
     pub above: Vec<bool>,
 }
 
-/// Finds the faces of `mesh`, its nodes at `x` (m, world), that `cut` opens.
-pub(super) fn open(mesh: &TetMesh, x: &[DVec3], cut: &Cut) -> Opened {
+/// Finds the faces of `mesh`, its nodes at `x` (m, world), that `cut` opens in `part` of its
+/// rectangle: from and to along its direction, from its middle (m).
+pub(super) fn open(mesh: &TetMesh, x: &[DVec3], cut: &Cut, part: [f64; 2]) -> Opened {
     let height: Vec<f64> = x.iter().map(|x| (x - cut.point).dot(cut.normal)).collect();
     let above = mesh.tets.iter().map(|tet| tet.map(|i| height[i as usize]).iter().sum::<f64>() > 0.0).collect();
     let mut sides = Sides { mesh, x, cut, neighbours: mesh.neighbours(), above };
     sides.smooth(&height);
     sides.keep_crumbs();
-    let open = (0..mesh.tets.len()).map(|t| [0, 1, 2, 3].map(|k| sides.is_open(t, k))).collect();
+    let in_part = |t: usize, k: usize| {
+        let [a, b, c] = sides.face(t, k);
+        let along = ((a + b + c) / 3.0 - cut.point).dot(cut.along);
+        (part[0]..=part[1]).contains(&along)
+    };
+    let open = |t: usize| [0, 1, 2, 3].map(|k| sides.is_open(t, k) && in_part(t, k));
+    let open = (0..mesh.tets.len()).map(open).collect();
     Opened { neighbours: sides.neighbours, open, above: sides.above }
 }
 

@@ -129,17 +129,31 @@ impl Cut {
 /// A body that does not exist, a state of another model, numbers that are not finite, vectors that
 /// are not of unit length, a direction out of the plane, extents that are not above 0.
 pub fn sever(model: &Model, state: &State, cut: &Cut) -> Result<Severed> {
+    sever_part(model, state, cut, [f64::NEG_INFINITY, f64::INFINITY])
+}
+
+/// The same, but of the rectangle only what lies between `part` opens: from and to, along its
+/// direction from its middle (m). Which elements lie on which side is decided by the whole
+/// rectangle, so that parts of one cut, opened one after the other, meet.
+///
+/// # Errors
+/// As [`sever`], and a part whose ends are not numbers.
+pub fn sever_part(model: &Model, state: &State, cut: &Cut, part: [f64; 2]) -> Result<Severed> {
     let Some(body) = model.bodies.get(cut.body) else {
         return Err(Error::Model(format!("body {} is to be cut; there are {}", cut.body, model.bodies.len())));
     };
-    cut.check().map_err(|reason| Error::Body { body: body.name.clone(), reason })?;
+    let refused = |reason| Error::Body { body: body.name.clone(), reason };
+    cut.check().map_err(refused)?;
+    if part.iter().any(|end| end.is_nan()) {
+        return Err(refused("a cut's part ends at a place that is no number".to_owned()));
+    }
     let fits = state.bodies.len() == model.bodies.len()
         && state.bodies.iter().zip(&model.bodies).all(|(state, body)| state.x.len() == body.len())
         && state.grasps_fit(model);
     if !fits {
         return Err(Error::Model(format!("body '{}' is to be cut in a state of another model", body.name)));
     }
-    let opened = faces::open(&body.rest, &state.positions(model, cut.body), cut);
+    let opened = faces::open(&body.rest, &state.positions(model, cut.body), cut, part);
     let split = split::split(&body.rest, &opened);
     if split.faces == 0 {
         let whole = Piece {

@@ -1,4 +1,4 @@
-//! Jaws and blades of an arm: they grasp, release and cut the tissue between them.
+//! Jaws of an arm: they grasp and release the tissue between them.
 
 use super::{ArmState, ArmUnit, Held};
 use crate::blades::{Tools, opening_force};
@@ -106,35 +106,6 @@ impl ArmUnit {
             self.state.design = self.model.design;
             events.push(CellEvent::Released { arm: self.model.side });
         }
-    }
-
-    /// Blades that were open with tissue between them and close through it cut it. Returns the
-    /// organ, and the cutter as wide as it was open.
-    ///
-    /// Edges that pass each other shear tissue instead of pressing it flat. So the contact of
-    /// closing blades is off until no tissue is left where the open blades were and the blades are
-    /// out of all organs. The shaft's contact stays.
-    pub fn cut(&mut self, world: &World) -> Option<(usize, Gripper)> {
-        let length = self.model.blades.length;
-        let between = |open: &Gripper| JawRegion::sized(open, length).fullest(world).map(|(organ, _)| organ);
-        if let Some(jaw_angle) = self.state.shears
-            && between(&Gripper { jaw_angle, ..self.state.gripper }).is_none()
-            && self.inside_organ(world, 3).is_none()
-        {
-            self.state.shears = None;
-        }
-        let state = &mut self.state;
-        if let Some(open) = state.scissors.follow(&state.gripper) {
-            return between(&open).map(|organ| (organ, open));
-        }
-        if let Some(jaw_angle) = state.scissors.opened().filter(|_| state.jaw_rate < 0.0) {
-            if between(&Gripper { jaw_angle, ..state.gripper }).is_some() {
-                state.shears = Some(jaw_angle);
-            } else {
-                state.scissors.rest();
-            }
-        }
-        None
     }
 
     /// Follows a cut of the held organ into `pieces`; `was` is the centroid of the held nodes

@@ -1,9 +1,11 @@
 //! One arm of the cell: its drive, its instrument in the tissue, and its grasp.
 
 mod jaws;
+mod shears;
 mod state;
 mod tissue_query;
 
+pub(super) use shears::Sheared;
 pub(super) use state::{ArmState, Held, Wanted};
 
 use super::drive::Drive;

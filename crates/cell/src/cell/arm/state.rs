@@ -1,10 +1,12 @@
 //! The state of an arm without its drive's, at the start and as numbers.
 
 use super::ArmModel;
+use crate::bite::Bite;
 use crate::cell::exchange::Exchange;
 use crate::cell::rules::ForceGuard;
 use crate::cell::setpoint::Setpoint;
 use crate::hold::Hold;
+use crate::severance::Parting;
 use crate::{GraspDesign, Gripper, Jaw, Scissors};
 use glam::DVec3;
 use trocar_core::Pose;
@@ -54,6 +56,9 @@ pub(crate) struct ArmState {
     /// Angle of a cutter's blades (rad) before they began to close through tissue. Such blades
     /// shear tissue and do not press it.
     pub shears: Option<f64>,
+    /// A cutter's blades on their way through tissue, and the tissue that they have parted.
+    pub bite: Option<Bite>,
+    pub parting: Option<Parting>,
     pub held: Option<Held>,
     /// Tissue frames for which jaws that closed on tissue have stood where they are commanded.
     pub standing: u32,
@@ -117,6 +122,8 @@ impl ArmState {
             forces: [ToolForce::default(); 3],
             scissors,
             shears: None,
+            bite: None,
+            parting: None,
             held: None,
             standing: 0,
             contact_disabled: false,
@@ -143,6 +150,8 @@ impl ArmState {
             forces,
             scissors,
             shears,
+            bite,
+            parting,
             held,
             standing,
             contact_disabled,
@@ -185,11 +194,13 @@ impl ArmState {
             all.extend([*organ as f64, *s, *opening]);
             all.extend(hold.numbers());
         }
-        // Only where there is something to count: hashes in episodes that were recorded before it
-        // was counted stay valid.
+        // Only where there is something: hashes in episodes that were recorded before it was there
+        // stay valid.
         if *standing > 0 {
             all.push(f64::from(*standing));
         }
+        all.extend(bite.iter().flat_map(Bite::numbers));
+        all.extend(parting.iter().flat_map(Parting::numbers));
         all
     }
 }

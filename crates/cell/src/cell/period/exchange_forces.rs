@@ -1,52 +1,27 @@
 //! Stage 4: the arms get the forces of the frame, jaws grasp and release, and blades cut.
 
 use crate::cell::Cell;
-use crate::cell::arm::ArmUnit;
+use crate::cell::arm::{ArmUnit, Sheared};
 use crate::cell::report::{CellEvent, PeriodLog};
-use crate::severance::Severance;
-use crate::{Gripper, Result, World};
-use glam::DVec3;
+use crate::{Result, World};
 use trocar_scene::InstrumentKind;
 use trocar_tissue::Event;
 
 impl Cell {
     pub(super) fn exchange_forces(&mut self, log: &mut PeriodLog) -> Result<()> {
         for k in 0..self.arms.len() {
-            if let Some((organ, open)) = self.arms[k].take_forces(&mut self.world, &mut log.events) {
-                self.cut(k, organ, &open, &mut log.events)?;
+            if let Some(sheared) = self.arms[k].take_forces(&mut self.world, &mut log.events) {
+                self.cut(k, &sheared, &mut log.events)?;
             }
         }
-        Ok(())
-    }
-
-    /// Cuts: the cutter of arm `k`, as wide as it is in `open`, has closed through `organ`.
-    fn cut(&mut self, k: usize, organ: usize, open: &Gripper, events: &mut Vec<CellEvent>) -> Result<()> {
-        let name = self.world.model.bodies()[organ].name().to_owned();
-        let arm = self.arms[k].model.side;
-        let (mut count, mut parted) = (1, None);
-        if self.sever {
-            let (before, closed) = (Severance::before(&self.world, organ, open), self.arms[k].state.gripper.jaw_angle);
-            let cut = open.cut_along(organ, self.arms[k].model.blades.length);
-            let was: Vec<DVec3> = self.arms.iter().map(|s| s.held_now(&self.world)).collect();
-            let pieces = self.world.sever(&cut)?;
-            count = pieces.len().max(1);
-            for (arm, was) in self.arms.iter_mut().zip(was) {
-                if arm.holds(organ) && !pieces.is_empty() {
-                    arm.follow_cut(&self.world, &pieces, was);
-                }
-            }
-            let held: Vec<(usize, usize)> = self.arms.iter().filter_map(ArmUnit::held_nodes).collect();
-            parted = Some(Box::new(before.after(&self.world, &pieces, &held, closed)));
-        }
-        events.push(CellEvent::Cut { arm, organ: name, pieces: count, parted });
         Ok(())
     }
 }
 
 impl ArmUnit {
-    /// Takes the forces of the frame, and lets the jaws grasp and release. Returns the organ
-    /// through which a cutter has closed, and the cutter as wide as it was open.
-    fn take_forces(&mut self, world: &mut World, events: &mut Vec<CellEvent>) -> Option<(usize, Gripper)> {
+    /// Takes the forces of the frame, and lets the jaws grasp and release. Returns what a cutter has
+    /// done.
+    fn take_forces(&mut self, world: &mut World, events: &mut Vec<CellEvent>) -> Option<Sheared> {
         let Self { model, state, .. } = self;
         state.forces = model.tools.forces(world.forces());
         state.exchange.end_frame(state.gripper.pose.translation, &state.forces);

@@ -9,6 +9,7 @@
 //! now.
 
 mod command;
+mod cutting;
 mod exchange_forces;
 mod move_arms;
 mod observe;

@@ -51,10 +51,17 @@ impl ArmUnit {
             force: TaggedForce { kind, wrench: self.tissue_wrench(kind) },
             contact,
             constraint,
-            jaw_force: opening_force(&state.gripper, Tools::of(0), &state.forces),
+            jaw_force: self.opening_force(),
             load_limited: state.exchange.limited,
             attached: state.held.is_some(),
         }
+    }
+
+    /// Force with which tissue pushes the blades apart (N): what presses on them, and what they cut.
+    pub fn opening_force(&self) -> f64 {
+        let state = &self.state;
+        let cut = state.bite.as_ref().map_or(0.0, |bite| bite.force);
+        opening_force(&state.gripper, Tools::of(0), &state.forces) + cut
     }
 
     /// The wrench of tissue on the instrument, of one kind, about the tip and in the cell's axes.

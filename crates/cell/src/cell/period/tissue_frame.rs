@@ -54,8 +54,13 @@ impl ArmUnit {
             angle
         } else if target < angle {
             let force = opening_force(&state.gripper, Tools::of(0), &state.forces);
-            state.jaw.squeeze(angle, force).max(target)
+            let free = state.jaw.squeeze(angle, force).max(target);
+            let most = state.jaw.budget * model.blades.lever();
+            state.bite.as_mut().map_or(free, |bite| bite.close(angle, free, most))
         } else {
+            if let Some(bite) = state.bite.as_mut().filter(|_| target > angle) {
+                bite.force = 0.0;
+            }
             state.jaw.turn_to(angle, target)
         };
         let next = Gripper { pose: self.drive.tip(), jaw_angle: next_angle };

@@ -4,9 +4,11 @@
 
 use super::*;
 use crate::GraspDesign;
+use crate::bite::Bite;
 use crate::cell::action::{Action, ActionSpace};
 use crate::cell::arm::{ArmState, Held, Wanted};
 use crate::hold::Hold;
+use crate::severance::Parting;
 use glam::DVec3;
 use trocar_testing::tube::{self, ONE_END, specimen};
 
@@ -35,6 +37,8 @@ fn changes(state: &ArmState, hold: &Hold) -> Vec<(&'static str, ArmState)> {
         forces: _,
         scissors: _,
         shears: _,
+        bite: _,
+        parting: _,
         held: _,
         contact_disabled: _,
         blades_disabled: _,
@@ -62,6 +66,8 @@ fn changes(state: &ArmState, hold: &Hold) -> Vec<(&'static str, ArmState)> {
         ("forces", changed(&|s| s.forces[1].pressing += 1e-9)),
         ("scissors", changed(&|s| s.scissors = crate::Scissors::new(0.9, 0.1))),
         ("shears", changed(&|s| s.shears = Some(0.5))),
+        ("bite", changed(&|s| s.bite = Some(Bite::new(0, 0.5, 300.0, 0.01, vec![0.0; 3])))),
+        ("parting", changed(&|s| s.parting = Some(Parting::default()))),
         ("standing", changed(&|s| s.standing = 3)),
         ("held", changed(&|s| s.held = Some(Held { organ: 0, s: 0.5, hold: hold.clone(), opening: 0.1 }))),
         ("contact_disabled", changed(&|s| s.contact_disabled ^= true)),

@@ -123,6 +123,7 @@ impl Setup {
             young_modulus_pa: Some(material.young_modulus_pa),
             poisson_ratio: Some(material.poisson_ratio),
             density_kg_m3: Some(material.density_kg_m3),
+            toughness_j_m2: None,
         };
         let places = places(&scene, &specimen)?;
         Ok(Self { condition, scene, specimen, places })

@@ -1,0 +1,85 @@
+//! The cutter's blades of an arm: when they bite, how far they have cut, and when that is told.
+
+use super::ArmUnit;
+use crate::bite::Bite;
+use crate::section::{chords, slit};
+use crate::{Gripper, JawRegion, World};
+
+/// What a cutter has done in a frame of tissue.
+#[derive(Clone, Debug)]
+pub(in crate::cell) struct Sheared {
+    /// The cutter as wide as it was open.
+    pub open: Gripper,
+    /// The part of the blades along which tissue is cut: distances from the pivot (m).
+    pub part: [f64; 2],
+    /// An event tells of the cut.
+    pub told: bool,
+    /// The blades open again, or are out of the tissue.
+    pub ends: bool,
+}
+
+impl ArmUnit {
+    /// Blades that were open with tissue between them and close through it cut it, as far as their
+    /// edges come.
+    ///
+    /// Edges that pass each other shear tissue instead of pressing it flat. So the contact of
+    /// closing blades is off until no tissue is left where the open blades were and the blades are
+    /// out of all organs. The shaft's contact stays, and what the cut takes is felt by the jaws.
+    pub fn cut(&mut self, world: &World) -> Option<Sheared> {
+        let length = self.model.blades.length;
+        let between = |open: &Gripper| JawRegion::sized(open, length).fullest(world).map(|(organ, _)| organ);
+        if let Some(jaw_angle) = self.state.shears
+            && between(&Gripper { jaw_angle, ..self.state.gripper }).is_none()
+            && self.inside_organ(world, 3).is_none()
+        {
+            self.state.shears = None;
+        }
+        let closes = self.state.jaw_rate < 0.0;
+        if let Some(jaw_angle) = self.state.scissors.opened().filter(|_| closes) {
+            match between(&Gripper { jaw_angle, ..self.state.gripper }) {
+                Some(organ) => {
+                    self.state.shears = Some(jaw_angle);
+                    if self.state.bite.is_none() {
+                        self.bite(world, organ, jaw_angle);
+                    }
+                }
+                None => self.state.scissors.rest(),
+            }
+        }
+        let state = &mut self.state;
+        let closed = state.scissors.follow(&state.gripper).is_some();
+        let bite = state.bite.as_mut()?;
+        let open = Gripper { jaw_angle: bite.opened, ..state.gripper };
+        let ends = state.shears.is_none() || state.jaw_rate > 0.0;
+        if !ends {
+            bite.measure(
+                &chords(world, bite.organ, &state.gripper, length, open.half_gap(length)),
+                state.gripper.jaw_angle,
+            );
+        }
+        // Below the gate an event follows when what was left is cut, too.
+        let rest = state.scissors.opened().is_none() && bite.is_through();
+        let told = (closed || ends || rest) && bite.has_news();
+        // Through is through: what lies at the rims is thinner than the edges are apart.
+        let part = if bite.is_through() { Some([f64::NEG_INFINITY, f64::INFINITY]) } else { bite.part() };
+        if told {
+            bite.told = bite.area();
+        }
+        match part {
+            Some(part) => Some(Sheared { open, part, told, ends }),
+            None => {
+                if ends {
+                    state.bite = None;
+                }
+                None
+            }
+        }
+    }
+
+    /// Begins to cut body `organ` with blades that were `opened` (rad).
+    fn bite(&mut self, world: &World, organ: usize, opened: f64) {
+        let (gripper, blades) = (&self.state.gripper, &self.model.blades);
+        let slit = slit(world, organ, gripper, blades.length);
+        self.state.bite = Some(Bite::new(organ, opened, world.toughness[organ], blades.lever(), slit));
+    }
+}
