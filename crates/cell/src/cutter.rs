@@ -8,7 +8,7 @@
 use crate::gripper::{BLADE_TIP, JAW_REGION_BEGIN};
 use crate::{Gripper, Result, World};
 use glam::DVec3;
-use trocar_tissue::{Cut, Piece, sever_part};
+use trocar_tissue::{Cut, Piece, Severed, sever, sever_part};
 
 /// Blades that were open wider than this (rad) are ready to cut ...
 pub const CUT_OPENED: f64 = 0.50;
@@ -98,21 +98,26 @@ impl World {
     /// # Errors
     /// An invalid cut, or pieces that cannot be stepped.
     pub fn sever(&mut self, cut: &Cut) -> Result<Vec<Piece>> {
-        self.sever_part(cut, [f64::NEG_INFINITY, f64::INFINITY])
+        let severed = sever(&self.model, &self.state, cut)?;
+        self.take_over(severed, cut.body)
     }
 
     /// The same for a part of the cut's rectangle: from and to, along the blades from its middle
-    /// (m).
+    /// (m); `sides` are those of the body's elements ([`trocar_tissue::sides`]).
     ///
     /// # Errors
     /// As [`World::sever`].
-    pub fn sever_part(&mut self, cut: &Cut, part: [f64; 2]) -> Result<Vec<Piece>> {
-        let severed = sever_part(&self.model, &self.state, cut, part)?;
+    pub fn sever_part(&mut self, cut: &Cut, part: [f64; 2], sides: &[bool]) -> Result<Vec<Piece>> {
+        let severed = sever_part(&self.model, &self.state, cut, part, sides)?;
+        self.take_over(severed, cut.body)
+    }
+
+    fn take_over(&mut self, severed: Severed, body: usize) -> Result<Vec<Piece>> {
         if severed.faces == 0 {
             return Ok(Vec::new());
         }
         self.stepper.set_model(&severed.model)?;
-        let (whole, toughness) = (self.axes[cut.body].clone(), self.toughness[cut.body]);
+        let (whole, toughness) = (self.axes[body].clone(), self.toughness[body]);
         for piece in &severed.pieces {
             let mut axis = whole.clone();
             axis.s = piece.nodes.iter().map(|node| whole.s[*node as usize]).collect();

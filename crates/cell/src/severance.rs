@@ -1,11 +1,11 @@
 //! An organ that blades part, a part of the way at a time, and figures of the cut.
 
-use crate::{Gripper, JawRegion, World};
+use crate::{Gripper, JawRegion, Result, World};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use trocar_geometry::TetMesh;
-use trocar_tissue::Piece;
+use trocar_tissue::{Piece, sides};
 
 /// Corners of the face opposite each corner of an element, counter-clockwise seen from outside.
 const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
@@ -111,6 +111,8 @@ struct BeforeCut {
     between_blades: f64,
     /// Normal of the cut.
     normal: DVec3,
+    /// For each element, whether it comes to lie on the side that the normal points to.
+    sides: Vec<bool>,
 }
 
 /// Volumes of the organ's elements (m3), negative where they are inverted.
@@ -129,8 +131,11 @@ struct CutMesh {
 }
 
 impl Parting {
-    /// Body `organ` before the open blades of `open` cut it.
-    pub fn new(world: &World, organ: usize, open: &Gripper) -> Self {
+    /// Body `organ` before the open blades of `open`, of `length` (m), cut it.
+    ///
+    /// # Errors
+    /// An invalid cut.
+    pub fn new(world: &World, organ: usize, open: &Gripper, length: f64) -> Result<Self> {
         let before = BeforeCut {
             organ,
             tets: world.model.bodies()[organ].tets().to_vec(),
@@ -138,9 +143,20 @@ impl Parting {
             opened: open.jaw_angle,
             between_blades: JawRegion::of(open).tissue_of(world, organ).map_or(0.0, |tissue| tissue.volume),
             normal: open.pose.rotation * DVec3::Z,
+            sides: sides(&world.model, &world.state, &open.cut_along(organ, length))?,
         };
         let part = [f64::INFINITY, f64::NEG_INFINITY];
-        Self { before: Arc::new(before), part, pieces: Vec::new(), figures: Severance::default(), told: None }
+        let before = Arc::new(before);
+        Ok(Self { before, part, pieces: Vec::new(), figures: Severance::default(), told: None })
+    }
+
+    /// The sides of the elements of the organ's body, which keeps one of the pieces.
+    pub fn sides(&self) -> Vec<bool> {
+        let (sides, organ) = (&self.before.sides, self.before.organ);
+        match self.pieces.iter().find(|piece| piece.body == organ) {
+            Some(piece) => piece.elements.iter().map(|t| sides[*t as usize]).collect(),
+            None => sides.clone(),
+        }
     }
 
     /// Volumes of the organ's elements now (m3).

@@ -4,9 +4,10 @@ use crate::bench::{
     CellBench, EpisodeBench, GraspBench, MeshingBench, OrgansBench, RenderBench, ScalingBench, ViewBench,
 };
 use crate::experiment::{
-    ControllerGridExperiment, ConvergenceExperiment, ElementQualityExperiment, GraspDesignsExperiment,
-    IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment, ReconstructionExperiment,
-    RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment, WrenchExperiment,
+    ControllerGridExperiment, ConvergenceExperiment, CutForceExperiment, ElementQualityExperiment,
+    GraspDesignsExperiment, IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment,
+    ReconstructionExperiment, RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment,
+    WrenchExperiment,
 };
 use crate::study::{Entry, Of};
 
@@ -18,6 +19,7 @@ pub static STUDIES: &[&dyn Entry] = &[
     &Of::<SettlingExperiment>::NEW,
     &Of::<GraspDesignsExperiment>::NEW,
     &Of::<ElementQualityExperiment>::NEW,
+    &Of::<CutForceExperiment>::NEW,
     &Of::<PortBudgetExperiment>::NEW,
     &Of::<ControllerGridExperiment>::NEW,
     &Of::<WrenchExperiment>::NEW,

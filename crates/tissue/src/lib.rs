@@ -76,7 +76,7 @@ mod untangle;
 pub use body::Body;
 pub use builder::{BodyDescription, MassFloor, ModelBuilder};
 pub use contact::{BodyContact, Collider, Event, Hull, Nearest, Shape, ToolContact, ToolForce};
-pub use cutting::{Cut, Piece, Severed, sever, sever_part};
+pub use cutting::{Cut, Piece, Severed, sever, sever_part, sides};
 pub use error::{Error, Result};
 pub use external::{BodyFrame, Integrator, Outcome};
 pub use grasp::{Compliance, Grasp, ToolMotion};

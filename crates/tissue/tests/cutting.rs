@@ -8,7 +8,7 @@ use trocar_geometry::TetMesh;
 use trocar_testing::blocks::{FRAME, GRAVITY, appendix, block, nodes, tissue};
 use trocar_tissue::{
     BodyDescription, Compliance, Cut, Grasp, MassFloor, Material, Model, ModelBuilder, Severed, SolverSettings, State,
-    Stepper, sever, sever_part,
+    Stepper, sever, sever_part, sides,
 };
 
 fn material() -> Material {
@@ -143,17 +143,25 @@ fn parts_of_a_cut_meet() {
         let model = one_body(&mesh, vec![]);
         let cut = Cut { along: DVec3::Y, ..Cut::through(0, at * DVec3::X, DVec3::X) };
         let whole = sever(&model, &State::new(&model), &cut).unwrap();
-        let (mut model, mut state, mut faces) = (model.clone(), State::new(&model), 0);
+        let above = sides(&model, &State::new(&model), &cut).unwrap();
+        let (mut model, mut state) = (model.clone(), State::new(&model));
+        // The last parts the body, so that its elements have their numbers until then.
         let ends = [f64::NEG_INFINITY, -1e-3, 0.0, 2e-3, f64::INFINITY];
+        let mut faces = 0;
         for part in ends.windows(2) {
-            let severed = sever_part(&model, &state, &cut, [part[0], part[1]]).unwrap();
+            assert_eq!(model.bodies().len(), 1, "{name}");
+            let severed = sever_part(&model, &state, &cut, [part[0], part[1]], &above).unwrap();
             faces += severed.faces;
             (model, state) = (severed.model, severed.state);
         }
-        assert_eq!((model.bodies().len(), faces >= whole.faces), (whole.model.bodies().len(), true), "{name}");
+        assert_eq!((model.bodies().len(), faces), (whole.model.bodies().len(), whole.faces), "{name}");
         for (a, b) in model.bodies().iter().zip(whole.model.bodies()) {
             assert_eq!((a.len(), a.tets().len()), (b.len(), b.tets().len()), "{name}");
         }
+        let refused = |part, sides: &[bool]| sever_part(&model, &state, &cut, part, sides).err().unwrap().to_string();
+        assert!(
+            refused([0.0, f64::NAN], &above).contains("no number") && refused([0.0; 2], &[]).contains("0 elements")
+        );
     }
 }
 

@@ -3,6 +3,7 @@
 mod appendix;
 mod controller_grid;
 mod convergence;
+mod cut_force;
 mod element_quality;
 mod grasp_designs;
 mod integrators;
@@ -17,6 +18,7 @@ mod wrench;
 
 pub use controller_grid::ControllerGridExperiment;
 pub use convergence::ConvergenceExperiment;
+pub use cut_force::CutForceExperiment;
 pub use element_quality::ElementQualityExperiment;
 pub use grasp_designs::GraspDesignsExperiment;
 pub use integrators::IntegratorsExperiment;

@@ -21,14 +21,22 @@ pub(super) struct Opened {
     pub above: Vec<bool>,
 }
 
-/// Finds the faces of `mesh`, its nodes at `x` (m, world), that `cut` opens in `part` of its
-/// rectangle: from and to along its direction, from its middle (m).
-pub(super) fn open(mesh: &TetMesh, x: &[DVec3], cut: &Cut, part: [f64; 2]) -> Opened {
+/// Whether each element of `mesh`, its nodes at `x` (m, world), is on the side of `cut` that its
+/// normal points to, after the sides are smoothed.
+pub(super) fn sides(mesh: &TetMesh, x: &[DVec3], cut: &Cut) -> Vec<bool> {
     let height: Vec<f64> = x.iter().map(|x| (x - cut.point).dot(cut.normal)).collect();
     let above = mesh.tets.iter().map(|tet| tet.map(|i| height[i as usize]).iter().sum::<f64>() > 0.0).collect();
     let mut sides = Sides { mesh, x, cut, neighbours: mesh.neighbours(), above };
     sides.smooth(&height);
     sides.keep_crumbs();
+    sides.above
+}
+
+/// Finds the faces of `mesh`, its nodes at `x` (m, world), that `cut` opens in `part` of its
+/// rectangle: from and to along its direction, from its middle (m). `above` has the elements'
+/// sides.
+pub(super) fn open(mesh: &TetMesh, x: &[DVec3], cut: &Cut, part: [f64; 2], above: &[bool]) -> Opened {
+    let sides = Sides { mesh, x, cut, neighbours: mesh.neighbours(), above: above.to_vec() };
     let in_part = |t: usize, k: usize| {
         let [a, b, c] = sides.face(t, k);
         let along = ((a + b + c) / 3.0 - cut.point).dot(cut.along);

@@ -129,31 +129,37 @@ impl Cut {
 /// A body that does not exist, a state of another model, numbers that are not finite, vectors that
 /// are not of unit length, a direction out of the plane, extents that are not above 0.
 pub fn sever(model: &Model, state: &State, cut: &Cut) -> Result<Severed> {
-    sever_part(model, state, cut, [f64::NEG_INFINITY, f64::INFINITY])
+    let sides = sides(model, state, cut)?;
+    sever_part(model, state, cut, [f64::NEG_INFINITY, f64::INFINITY], &sides)
 }
 
-/// The same, but of the rectangle only what lies between `part` opens: from and to, along its
-/// direction from its middle (m). Which elements lie on which side is decided by the whole
-/// rectangle, so that parts of one cut, opened one after the other, meet.
+/// For each element of the body that `cut` is to sever, whether it comes to lie on the side that the
+/// normal points to.
 ///
 /// # Errors
-/// As [`sever`], and a part whose ends are not numbers.
-pub fn sever_part(model: &Model, state: &State, cut: &Cut, part: [f64; 2]) -> Result<Severed> {
-    let Some(body) = model.bodies.get(cut.body) else {
-        return Err(Error::Model(format!("body {} is to be cut; there are {}", cut.body, model.bodies.len())));
-    };
+/// As [`sever`].
+pub fn sides(model: &Model, state: &State, cut: &Cut) -> Result<Vec<bool>> {
+    let body = check(model, state, cut)?;
+    Ok(faces::sides(&body.rest, &state.positions(model, cut.body), cut))
+}
+
+/// As [`sever`], but of the rectangle only what lies between `part` opens: from and to, along its
+/// direction from its middle (m). `sides` are those of the body's elements, from [`sides`] before
+/// the first part. So parts of a cut that are opened one after the other meet.
+///
+/// # Errors
+/// As [`sever`]; a part whose ends are not numbers, and sides of another body.
+pub fn sever_part(model: &Model, state: &State, cut: &Cut, part: [f64; 2], sides: &[bool]) -> Result<Severed> {
+    let body = check(model, state, cut)?;
     let refused = |reason| Error::Body { body: body.name.clone(), reason };
-    cut.check().map_err(refused)?;
     if part.iter().any(|end| end.is_nan()) {
-        return Err(refused("a cut's part ends at a place that is no number".to_owned()));
+        return Err(refused("a part of a cut ends at a place that is no number".to_owned()));
     }
-    let fits = state.bodies.len() == model.bodies.len()
-        && state.bodies.iter().zip(&model.bodies).all(|(state, body)| state.x.len() == body.len())
-        && state.grasps_fit(model);
-    if !fits {
-        return Err(Error::Model(format!("body '{}' is to be cut in a state of another model", body.name)));
+    if sides.len() != body.tets.len() {
+        let (given, here) = (sides.len(), body.tets.len());
+        return Err(refused(format!("a cut has sides of {given} elements; the body has {here}")));
     }
-    let opened = faces::open(&body.rest, &state.positions(model, cut.body), cut, part);
+    let opened = faces::open(&body.rest, &state.positions(model, cut.body), cut, part, sides);
     let split = split::split(&body.rest, &opened);
     if split.faces == 0 {
         let whole = Piece {
@@ -164,6 +170,21 @@ pub fn sever_part(model: &Model, state: &State, cut: &Cut, part: [f64; 2]) -> Re
         return Ok(Severed { model: model.clone(), state: state.clone(), faces: 0, pieces: vec![whole] });
     }
     Ok(carry::carry(model, state, cut.body, &split))
+}
+
+/// The body that `cut` is to sever.
+fn check<'m>(model: &'m Model, state: &State, cut: &Cut) -> Result<&'m crate::Body> {
+    let Some(body) = model.bodies.get(cut.body) else {
+        return Err(Error::Model(format!("body {} is to be cut; there are {}", cut.body, model.bodies.len())));
+    };
+    cut.check().map_err(|reason| Error::Body { body: body.name.clone(), reason })?;
+    let fits = state.bodies.len() == model.bodies.len()
+        && state.bodies.iter().zip(&model.bodies).all(|(state, body)| state.x.len() == body.len())
+        && state.grasps_fit(model);
+    if !fits {
+        return Err(Error::Model(format!("body '{}' is to be cut in a state of another model", body.name)));
+    }
+    Ok(body)
 }
 
 #[cfg(test)]

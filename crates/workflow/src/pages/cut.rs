@@ -40,6 +40,11 @@ pub(super) fn section(s: &Severed) -> String {
             format!("{} to {} rad", fixed(c.opened_rad, 2), fixed(c.closed_rad, 2)),
             format!("closed {} s into the episode", fixed(s.time_s, 2)),
         ),
+        Card::new(
+            "Work of the blades",
+            format!("{} mJ", fixed(c.work_mj, 1)),
+            format!("at most {} N at their middle", fixed(c.force_peak_n, 1)),
+        ),
     ]);
     if !c.pieces.is_empty() {
         body += &pieces(&c.pieces).html();

@@ -48,19 +48,21 @@ impl Cell {
     /// Parts the tissue of body `organ` as far as the blades of arm `k` have come, if that is
     /// farther than before.
     fn part(&mut self, k: usize, organ: usize, sheared: &Sheared) -> Result<()> {
-        let parting = self.arms[k].state.parting.take();
-        let mut parting = parting.unwrap_or_else(|| Parting::new(&self.world, organ, &sheared.open));
+        let length = self.arms[k].model.blades.length;
+        let mut parting = match self.arms[k].state.parting.take() {
+            Some(parting) => parting,
+            None => Parting::new(&self.world, organ, &sheared.open, length)?,
+        };
         let ([from, to], [was_from, was_to]) = (sheared.part, parting.part);
         let longer =
             if parting.part == sheared.part { 0.0 } else { (was_from - from).max(0.0) + (to - was_to).max(0.0) };
         if longer >= ADVANCE || sheared.told && longer > 0.0 {
             parting.part = sheared.part;
-            let length = self.arms[k].model.blades.length;
             let middle = 0.5 * (JAW_REGION_BEGIN + length);
             let was: Vec<DVec3> = self.arms.iter().map(|s| s.held_now(&self.world)).collect();
             let volumes = parting.volumes(&self.world);
             let cut = sheared.open.cut_along(organ, length);
-            let pieces = self.world.sever_part(&cut, [from - middle, to - middle])?;
+            let pieces = self.world.sever_part(&cut, [from - middle, to - middle], &parting.sides())?;
             for (arm, was) in self.arms.iter_mut().zip(was) {
                 if arm.holds(organ) && !pieces.is_empty() {
                     arm.follow_cut(&self.world, &pieces, was);
