@@ -134,7 +134,7 @@ impl Facts<'_> {
             _ => None,
         });
         // The first that severed; else how far they came.
-        let last = cuts.clone().last();
+        let last = cuts.clone().next_back();
         let (time_s, cut) = cuts.find(|(_, cut)| cut.outcome == "severed").or(last)?;
         let mut cut = Severance::clone(cut);
         for piece in &mut cut.pieces {

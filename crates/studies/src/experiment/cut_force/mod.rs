@@ -8,7 +8,6 @@ mod specimen;
 use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
-use glam::DVec3;
 use result::{CutForceResult, CutRow, CutSample, WeakScissors};
 use specimen::{Shape, THICKNESS};
 use std::collections::BTreeMap;
