@@ -98,6 +98,8 @@ pub(crate) struct Parting {
     pub figures: Severance,
     /// Number of faces that events told of.
     pub told: Option<usize>,
+    /// Number of cuts of the world when it parted last.
+    cuts: usize,
 }
 
 /// An organ before it is cut.
@@ -147,7 +149,14 @@ impl Parting {
         };
         let part = [f64::INFINITY, f64::NEG_INFINITY];
         let before = Arc::new(before);
-        Ok(Self { before, part, pieces: Vec::new(), figures: Severance::default(), told: None })
+        let (pieces, figures) = (Vec::new(), Severance::default());
+        Ok(Self { before, part, pieces, figures, told: None, cuts: world.cuts })
+    }
+
+    /// Whether nothing else has been cut since it parted last: pieces and sides are of the organ as
+    /// it is.
+    pub fn is_of(&self, world: &World) -> bool {
+        self.cuts == world.cuts
     }
 
     /// The sides of the elements of the organ's body, which keeps one of the pieces.
@@ -185,15 +194,16 @@ impl Parting {
         } else if self.pieces.is_empty() {
             self.pieces = pieces.to_vec();
         }
+        self.cuts = world.cuts;
         self.figures = self.before.after(world, &self.pieces, volumes, held);
     }
 
     /// The numbers of its state; the tissue is the world's.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
-        let Self { before, part, pieces, figures, told } = self;
+        let Self { before, part, pieces, figures, told, cuts } = self;
         let told = told.map_or(-1.0, |told| told as f64);
         let own = [before.organ as f64, before.opened, part[0], part[1], told];
-        own.into_iter().chain([pieces.len() as f64, figures.area_mm2])
+        own.into_iter().chain([pieces.len() as f64, figures.area_mm2, *cuts as f64])
     }
 }
 

@@ -49,7 +49,8 @@ impl Cell {
     /// farther than before.
     fn part(&mut self, k: usize, organ: usize, sheared: &Sheared) -> Result<()> {
         let length = self.arms[k].model.blades.length;
-        let mut parting = match self.arms[k].state.parting.take() {
+        let parting = self.arms[k].state.parting.take().filter(|parting| parting.is_of(&self.world));
+        let mut parting = match parting {
             Some(parting) => parting,
             None => Parting::new(&self.world, organ, &sheared.open, length)?,
         };

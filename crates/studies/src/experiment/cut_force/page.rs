@@ -11,6 +11,9 @@ use trocar_report::table::{fixed, percent};
 /// Bars of the two errors.
 const BARS: [f64; 2] = [0.15, 0.10];
 
+/// Colour of the closed form.
+const FORM: [u8; 3] = [128, 128, 128];
+
 /// Forces beyond this many times the largest of a run are left out of the closed form's line.
 const SHOWN: f64 = 1.1;
 
@@ -23,7 +26,7 @@ pub(super) fn document(r: &CutForceResult) -> Result<Document> {
         fixed(r.lever_mm, 1)
     );
     let section = Section::new("Force of scissors", lead).cards(cards(r)).figures([
-        plot(r, "slab", "<b>Slab.</b> Measured, and thin the closed form of Mahvash and Okamura.")?,
+        plot(r, "slab", "<b>Slab</b>: what the jaws felt, and the closed form of Mahvash and Okamura.")?,
         plot(r, "tube", "<b>Tube</b> of 9 mm.")?,
     ]);
     Ok(Document::new("Force of scissors", "Torque and work of a cut beside the closed form")
@@ -59,8 +62,8 @@ fn plot(r: &CutForceResult, shape: &str, caption: &str) -> Result<String> {
         let form = row.samples.iter().filter_map(|s| Some((degrees(s.angle_rad), s.closed_form_nm?)));
         let form = form.map(|(angle, nm)| (angle, nm / (1e-3 * r.lever_mm)));
         let form: Vec<(f64, f64)> = form.filter(|p| p.1 < SHOWN * row.force_peak_n).collect();
-        // Dashes: plots have no other kind of line.
-        lines.extend(form.chunks(2).map(|dash| Line::new(dash.to_vec(), colors::organ(k + 4))));
+        // Plots have no other kind of line.
+        lines.extend(form.chunks(2).map(|dash| Line::new(dash.to_vec(), FORM)));
     }
     let plot = Plot {
         title: "Force over opening",
@@ -71,7 +74,8 @@ fn plot(r: &CutForceResult, shape: &str, caption: &str) -> Result<String> {
         ..Plot::default()
     };
     let names: Vec<String> = rows.iter().map(|row| format!("{} J/m\u{b2}", row.toughness_j_m2)).collect();
-    let legend = page::legend(names.iter().enumerate().map(|(k, n)| (n.as_str(), colors::organ(k))));
+    let form = rows.iter().any(|row| row.force_error.is_some()).then_some(("closed form (dashes)", FORM));
+    let legend = page::legend(names.iter().enumerate().map(|(k, n)| (n.as_str(), colors::organ(k))).chain(form));
     Ok(plot.figure(&format!("{caption}{legend}"))?)
 }
 
