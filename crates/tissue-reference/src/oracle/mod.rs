@@ -60,6 +60,7 @@ use trocar_tissue::{Body, Model, ToolForce, ToolMotion};
 pub struct Oracle {
     groups: Vec<Group>,
     forces: Vec<ToolForce>,
+    pushes: Vec<DVec3>,
 }
 
 /// Bodies that are solved together: one, or all if bodies touch each other.
@@ -79,6 +80,8 @@ struct Solved {
     anchors: Vec<Option<DVec3>>,
     stretches: Stretches,
     forces: Vec<ToolForce>,
+    /// Force of all contacts on each node (N).
+    pushes: Vec<DVec3>,
     solution: Solution,
 }
 
@@ -98,7 +101,7 @@ impl Oracle {
             let lengths = model.bodies()[bodies.clone()].iter().map(Body::len).collect();
             Group { touching: Touching::new(model, bodies.clone()), bodies, lengths, elastic, solver }
         };
-        Self { groups: groups.into_iter().map(prepare).collect(), forces: Vec::new() }
+        Self { groups: groups.into_iter().map(prepare).collect(), forces: Vec::new(), pushes: Vec::new() }
     }
 
     /// Advances `state` by one step of implicit Euler of length `dt` (s), the counterpart of one
@@ -162,6 +165,12 @@ impl Oracle {
         &self.forces
     }
 
+    /// Force of tools and other bodies on each body at the end of the last step (N), supports left
+    /// out.
+    pub fn pushes(&self) -> &[DVec3] {
+        &self.pushes
+    }
+
     /// The incremental potential of each body (J) of a step of `dt` (s) from `before` that ends
     /// with the positions of `after`: the function that [`Self::step`] minimises over free nodes,
     /// without friction. It is not finite where an element has no volume. Only differences have a
@@ -213,6 +222,7 @@ impl Oracle {
         }
         self.forces.clear();
         self.forces.resize(tools.len(), ToolForce::default());
+        self.pushes.clear();
         state.stretches.clear();
         let mut solutions = Vec::with_capacity(state.bodies.len());
         for (group, mut solved) in self.groups.iter().zip(solved) {
@@ -230,6 +240,7 @@ impl Oracle {
                 let anchors = model.bodies()[solutions.len()].supports().len() * body.x.len();
                 let end = (anchor + anchors).min(solved.anchors.len());
                 body.anchors = solved.anchors[anchor..end].to_vec();
+                self.pushes.push(solved.pushes[range.clone()].iter().sum());
                 (first, anchor) = (range.end, end);
                 solutions.push(solved.solution);
             }
@@ -276,13 +287,15 @@ impl Group {
         let solution = rounds::minimise(solver, &mut potential, &fixed, &targets, &before.v, &mut x).map_err(named)?;
         let mut forces = vec![ToolForce::default(); tools.len()];
         let mut stretches = Stretches::new();
+        let mut pushes = vec![DVec3::ZERO; x.len()];
         if let Some(contacts) = &potential.contacts {
             contacts.add_forces(&x, &mut forces);
+            contacts.gradient(&x, |i, gradient| pushes[i] -= gradient);
             if dt.is_some() {
                 stretches = contacts.stretches(&x);
             }
         }
         let anchors = potential.anchors(&x);
-        Ok(Solved { x, fixed: fixed.clone(), anchors, stretches, forces, solution })
+        Ok(Solved { x, fixed: fixed.clone(), anchors, stretches, forces, pushes, solution })
     }
 }
