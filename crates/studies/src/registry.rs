@@ -4,9 +4,10 @@ use crate::bench::{
     CellBench, EpisodeBench, GraspBench, MeshingBench, OrgansBench, RenderBench, ScalingBench, ViewBench,
 };
 use crate::experiment::{
-    ControllerGridExperiment, ConvergenceExperiment, ElementQualityExperiment, GraspDesignsExperiment,
-    IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment, ReconstructionExperiment,
-    RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment, WrenchExperiment,
+    ContactExperiment, ControllerGridExperiment, ConvergenceExperiment, ElementQualityExperiment,
+    GraspDesignsExperiment, IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment,
+    ReconstructionExperiment, RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment,
+    WrenchExperiment,
 };
 use crate::study::{Entry, Of};
 
@@ -15,6 +16,7 @@ pub static STUDIES: &[&dyn Entry] = &[
     &Of::<ReconstructionExperiment>::NEW,
     &Of::<ConvergenceExperiment>::NEW,
     &Of::<IntegratorsExperiment>::NEW,
+    &Of::<ContactExperiment>::NEW,
     &Of::<SettlingExperiment>::NEW,
     &Of::<GraspDesignsExperiment>::NEW,
     &Of::<ElementQualityExperiment>::NEW,
