@@ -255,19 +255,17 @@ impl<'a> Contacts<'a> {
     fn grip(&self, touch: &mut Touch<'a>, x: &[DVec3], rubs: bool) {
         let gap = touch.gap(x, self.blur);
         // The direction in which the point that touches would open the gap.
-        let (touching, touched): (Vec<_>, Vec<_>) = gap.shares.iter().zip(&gap.gradient).partition(|(s, _)| s.1 > 0.0);
-        let push: DVec3 = touching.iter().map(|(_, (_, g))| *g).sum();
+        let slopes = gap.gradient.iter().zip(&gap.shares);
+        let push: DVec3 = slopes.filter(|(_, (_, share))| *share > 0.0).map(|((_, slope), _)| *slope).sum();
         let place = self.start.map_or(DVec3::ZERO, |(start, stretches)| {
-            let at = |part: &[(&(usize, f64), &(usize, DVec3))]| -> DVec3 {
-                part.iter().map(|((i, share), _)| *share * start[*i]).sum()
-            };
             let stretch = stretches.get(&touch.key).copied().unwrap_or_default();
+            let before = gap.shares.iter().map(|(i, share)| *share * start[*i]).sum::<DVec3>() - stretch;
             match touch.key.touched {
-                Touched::Collider(c) => self.poses[c].map_or(DVec3::ZERO, |[from, to]| {
-                    let back = from.inverse();
-                    to.transform(back.transform(at(&touching) - stretch))
-                }),
-                Touched::Body(_) => at(&touching) + at(&touched) - stretch,
+                Touched::Collider(c) => {
+                    let carried = |[from, to]: [Pose; 2]| to.transform(from.inverse().transform(before));
+                    self.poses[c].map_or(before, carried)
+                }
+                Touched::Body(_) => before,
             }
         });
         let pressed = touch.stiffness * (-gap.depth).max(0.0);
