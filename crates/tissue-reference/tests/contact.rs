@@ -93,6 +93,48 @@ fn a_pressed_sphere_meets_the_oracles_force_and_field() {
     }
 }
 
+/// The force along the surface when it begins to slide, of both; `speed` is in m/s.
+fn threshold(contact: ToolContact, speed: f64) -> [f64; 2] {
+    /// Substeps of the fast solver in a frame, and frames to press.
+    const SUBSTEPS: u32 = 2;
+    const DOWN: u32 = 8;
+    let (radius, depth, way) = (3e-3, 1e-3, 2.4e-3);
+    let ends = [DVec3::new(8.3e-3, 7.1e-3, 0.0), DVec3::new(8.7e-3, 16.6e-3, 0.0)];
+    let model = layer(EDGES[1], Shape::Capsule { ends, radius }, 0.15, contact);
+    let place = |t: f64| {
+        let (down, along) = ((t / f64::from(DOWN)).min(1.0), speed * FRAME * (t - f64::from(DOWN)).max(0.0));
+        at(DVec3::new(along, 0.0, TOP + radius - depth * down))
+    };
+    let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap());
+    let (mut oracle, mut exact) = (Oracle::new(&model), OracleState::new(&model));
+    let motion = |from: f64, to: f64| [ToolMotion { from: place(from), to: place(to) }];
+    let (mut most, mut last) = ([0.0f64; 2], [0.0f64; 2]);
+    for k in 0..DOWN + (way / (speed * FRAME)).round() as u32 {
+        let from = f64::from(k);
+        stepper.step(&model, &mut state, &motion(from, from + 1.0));
+        for s in 0..SUBSTEPS {
+            let [a, b] = [s, s + 1].map(|s| from + f64::from(s) / f64::from(SUBSTEPS));
+            oracle.step_with_tools(&model, &mut exact, FRAME / f64::from(SUBSTEPS), &[], &motion(a, b)).unwrap();
+        }
+        if k >= DOWN {
+            let forces = [stepper.forces()[0], oracle.forces()[0]];
+            last = forces.map(|force| -force.contact.force.x);
+            most = [0, 1].map(|i| most[i].max(last[i]));
+        }
+    }
+    assert!((0..2).all(|i| last[i] < 0.99 * most[i]), "it slides: {most:?} N, {last:?} N at the end");
+    println!("{contact:?}, {speed} m/s: slides at {:.5} N, oracle {:.5} N", most[0], most[1]);
+    most
+}
+
+#[test]
+fn a_dragged_capsule_slides_at_the_oracles_force() {
+    for contact in [ToolContact::Vertices, ToolContact::Surface] {
+        let [fast, truth] = threshold(contact, 6e-3);
+        assert!((fast / truth - 1.0).abs() < 0.04, "{fast} N, {truth} N");
+    }
+}
+
 /// A block whose top is held goes down onto a layer, by which it is pushed back.
 #[test]
 fn a_body_on_another_meets_the_oracles_force() {
