@@ -17,8 +17,8 @@ mod trials;
 
 pub use bench::{CellBench, EpisodeBench, GraspBench, MeshingBench, OrgansBench, RenderBench, ScalingBench};
 pub use experiment::{
-    ControllerGridExperiment, ConvergenceExperiment, ElementQualityExperiment, GraspDesignsExperiment,
-    IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment, ReconstructionExperiment, RolloutsExperiment,
-    SettlingExperiment, SimilarityExperiment, WrenchExperiment,
+    ContactExperiment, ControllerGridExperiment, ConvergenceExperiment, ElementQualityExperiment,
+    GraspDesignsExperiment, IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment,
+    ReconstructionExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment, WrenchExperiment,
 };
 pub use trocar_workflow::{Error, Result};

@@ -4,7 +4,7 @@ use crate::bench::{
     CellBench, EpisodeBench, GraspBench, MeshingBench, OrgansBench, RenderBench, ScalingBench, ViewBench,
 };
 use crate::experiment::{
-    ControllerGridExperiment, ConvergenceExperiment, CutForceExperiment, ElementQualityExperiment,
+    ContactExperiment, ControllerGridExperiment, ConvergenceExperiment, CutForceExperiment, ElementQualityExperiment,
     GraspDesignsExperiment, IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment,
     ReconstructionExperiment, RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment,
     WrenchExperiment,
@@ -16,6 +16,7 @@ pub static STUDIES: &[&dyn Entry] = &[
     &Of::<ReconstructionExperiment>::NEW,
     &Of::<ConvergenceExperiment>::NEW,
     &Of::<IntegratorsExperiment>::NEW,
+    &Of::<ContactExperiment>::NEW,
     &Of::<SettlingExperiment>::NEW,
     &Of::<GraspDesignsExperiment>::NEW,
     &Of::<ElementQualityExperiment>::NEW,

@@ -141,7 +141,7 @@ fn lift_and_probe(frame: usize) -> Vec<Pose> {
 fn bodies_and_tools_that_touch() {
     let (model, state) = touching_bodies();
     let found = hashes(&model, &state, 40, &lift_and_probe, &[]);
-    check("bodies and tools that touch", found, [0x3534d36ae65e9d3b, 0xdb6373eca0755d95, 0x1e4619849861a1fe]);
+    check("bodies and tools that touch", found, [0xb04fcde2dd7ec925, 0xc18d125f22a6087f, 0xdcff47f959a781f0]);
 }
 
 /// Loads, a state with inverted elements, and one that is to be relaxed.
@@ -161,7 +161,7 @@ fn loads_and_disturbed_states() {
     let loads = [(0, 40, DVec3::new(0.01, 0.0, 0.02)), (2, 5, DVec3::new(0.0, 1e-3, 1e-3))];
     let loads = loads.map(|(body, node, force)| Load { body, node, force });
     let found = hashes(&model, &state, 20, &lift_and_probe, &loads);
-    check("loads and disturbed states", found, [0xfeec37c095da9d93, 0xbd5153b9c2e103e0, 0xb6be3ecca1f8784f]);
+    check("loads and disturbed states", found, [0x377dc404628f8365, 0x2aefa14452e87d5c, 0x11524cd02abb7122]);
 }
 
 /// A block that a rigid grasp crushes.
@@ -202,7 +202,7 @@ fn struck_block() {
         vec![at(DVec3::new(2e-3, 0.0, -11e-3) * t), at(DVec3::new(8e-3, 0.0, -3e-3) * t)]
     };
     let found = hashes(&model, &state, 24, &tools, &[]);
-    check("struck block", found, [0xb0f1dee1e410a05e, 0xeb176169fb6f878a, 0x7b2239d9454a1ee0]);
+    check("struck block", found, [0x849255b009414ada, 0xe9de00329b055ada, 0xa72092dd2acf5c68]);
 }
 
 /// Elements pressed almost flat, thrown inwards and hit: it overstretches.
@@ -224,7 +224,7 @@ fn flat_elements() {
     }
     let tools = |k: usize| vec![at(DVec3::new(0.0, 0.0, -9e-3) * bump(k, 6))];
     let found = hashes(&model, &state, 12, &tools, &[]);
-    check("flat elements", found, [0xf6abf1b0585a7843, 0xd891a3b68a92f4b4, 0xd73a2e11f92afe59]);
+    check("flat elements", found, [0xf1fd9fb9c5a77629, 0xddba5caccd5afaf7, 0x0b119d6ed8a55589]);
 }
 
 /// A spring of negative stiffness: the matrix has no Cholesky factor, and sweeps take over in the
@@ -236,5 +236,5 @@ fn fallback_to_sweeps() {
         jaws.stiffness = -30.0;
     }
     let found = hashes(&model, &state, 12, &lift_and_probe, &[]);
-    check("fallback to sweeps", found, [0x8a4d2beb0a621d49, 0xc527dc690c8ec82a, 0x77113e347b6f57be]);
+    check("fallback to sweeps", found, [0x77179c77c112344a, 0xbbefdb65fe82ec68, 0x77113e347b6f57be]);
 }

@@ -1,6 +1,7 @@
 //! The paper's tables and figures: one file or folder each.
 
 mod appendix;
+mod contact;
 mod controller_grid;
 mod convergence;
 mod cut_force;
@@ -16,6 +17,7 @@ mod settling;
 mod similarity;
 mod wrench;
 
+pub use contact::ContactExperiment;
 pub use controller_grid::ControllerGridExperiment;
 pub use convergence::ConvergenceExperiment;
 pub use cut_force::CutForceExperiment;

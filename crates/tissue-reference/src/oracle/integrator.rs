@@ -1,8 +1,8 @@
 //! The oracle's step as an integrator of the stepper, for studies: slow, and it allocates.
 
-use super::friction;
 use super::newton::Solver;
 use super::potential::{Elastic, Motion, Potential};
+use super::rounds;
 use super::solution::Precision;
 use super::state::Nodes;
 use glam::DVec3;
@@ -46,9 +46,10 @@ impl Integrator for NewtonIntegrator {
             let elastic = &self.elastic;
             let mut step = Motion::new(elastic, &nodes, frame.gravity(), h);
             frame.loads().for_each(|(node, force)| step.push(elastic, node, force));
-            let mut potential = Potential { elastic, motion: Some(step), gravity: frame.gravity(), limits: Vec::new() };
+            let mut potential =
+                Potential { elastic, motion: Some(step), gravity: frame.gravity(), limits: Vec::new(), contacts: None };
             let mut x = nodes.x.clone();
-            match friction::minimise(&mut self.solver, &mut potential, &fixed, &targets, &nodes.v, &mut x) {
+            match rounds::minimise(&mut self.solver, &mut potential, &fixed, &targets, &nodes.v, &mut x) {
                 Ok(solution) => outcome.iterations += solution.iterations,
                 Err(_) => {
                     outcome.unsolved = true;

@@ -43,6 +43,8 @@ pub(super) struct Solver {
 
 struct System {
     fixed: Vec<bool>,
+    /// Pairs of nodes that contacts couple, sorted.
+    coupled: Vec<[u32; 2]>,
     matrix: Stiffness,
     factor: Factor,
 }
@@ -64,10 +66,14 @@ impl Solver {
     }
 
     fn prepare(&mut self, potential: &Potential<'_>, fixed: &[bool]) -> Result<&mut System, Failure> {
-        if self.system.as_ref().is_none_or(|system| system.fixed != fixed) {
-            let matrix = Stiffness::new(&potential.elastic.tets, fixed);
+        let coupled = coupled(potential);
+        let fits = |system: &System| {
+            system.fixed == fixed && coupled.iter().all(|pair| system.coupled.binary_search(pair).is_ok())
+        };
+        if !self.system.as_ref().is_some_and(fits) {
+            let matrix = Stiffness::with_pairs(&potential.elastic.tets, &coupled, fixed);
             let factor = Factor::new(&matrix, &potential.elastic.rest);
-            self.system = Some(System { fixed: fixed.to_vec(), matrix, factor });
+            self.system = Some(System { fixed: fixed.to_vec(), coupled, matrix, factor });
         }
         self.system.as_mut().ok_or(Failure::Singular)
     }
@@ -208,6 +214,18 @@ impl System {
         }
         Err(Failure::Singular)
     }
+}
+
+/// Pairs of nodes that contacts couple, sorted.
+fn coupled(potential: &Potential<'_>) -> Vec<[u32; 2]> {
+    let mut coupled = Vec::new();
+    for set in potential.contacts.iter().flat_map(|contacts| contacts.couplings()) {
+        let pairs = (0..set.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
+        coupled.extend(pairs.map(|(a, b)| [set[a].min(set[b]) as u32, set[a].max(set[b]) as u32]));
+    }
+    coupled.sort_unstable();
+    coupled.dedup();
+    coupled
 }
 
 /// Norm over free nodes.

@@ -1,12 +1,17 @@
-//! The minimised function: energy, gradient and Hessian over all nodes of a body.
+//! The minimised function: energy, gradient and Hessian over all nodes of a body, or of several that
+//! may touch.
 
+use super::contact::Contacts;
 use super::element::{deformation, projected};
+use super::rub::{self, outer};
 use super::state::Nodes;
 use glam::{DMat3, DVec3};
+use std::ops::Range;
 use trocar_tissue::assembly::{Stiffness, blocks, shape_gradients, tangent};
 use trocar_tissue::{Body, Hyperelastic, Support, SupportContact};
 
-/// Constants of a body's energies, nodes in their original order.
+/// Constants of the energies of a body, nodes in their original order; or of several bodies, one
+/// after the other.
 pub(super) struct Elastic {
     /// (m)
     pub rest: Vec<DVec3>,
@@ -15,36 +20,75 @@ pub(super) struct Elastic {
     pub gradients: Vec<[DVec3; 4]>,
     /// Rest volumes (m3).
     pub volumes: Vec<f64>,
-    pub psi: Box<dyn Hyperelastic>,
+    /// The material of each body's elements, and the end of these.
+    materials: Vec<(usize, Box<dyn Hyperelastic>)>,
     /// (kg)
     pub masses: Vec<f64>,
     /// Edges with a dashpot: nodes and coefficient (N s/m).
     dashpots: Vec<([usize; 2], f64)>,
-    supports: Vec<Support>,
+    supports: Vec<Supported>,
     /// (N/m)
-    contact_stiffness: Vec<f64>,
+    pub contact_stiffness: Vec<f64>,
     /// An energy that is large beside every change that matters (J): energies are known to its
     /// rounding.
     pub scale: f64,
 }
 
+/// A support, and the nodes of the body that lies on it.
+struct Supported {
+    support: Support,
+    nodes: Range<usize>,
+    /// Number of the first node among all nodes at all supports.
+    first: usize,
+}
+
 impl Elastic {
+    /// Of one body.
     pub fn new(body: &Body) -> Self {
-        let (mu, lambda) = body.material().lame();
-        let mesh = body.rest();
-        let dashpots = body.dashpots().into_iter();
-        Self {
-            rest: mesh.vertices.clone(),
-            tets: mesh.tets.clone(),
-            gradients: (0..mesh.tets.len()).map(|t| shape_gradients(mesh, t)).collect(),
-            volumes: body.volumes().to_vec(),
-            psi: body.material().hyperelastic(),
-            masses: (0..body.len()).map(|i| body.mass(i)).collect(),
-            dashpots: dashpots.map(|(nodes, damping)| (nodes.map(|i| i as usize), damping)).collect(),
-            supports: body.supports().to_vec(),
-            contact_stiffness: (0..body.len()).map(|i| body.contact_stiffness(i)).collect(),
-            scale: (mu + lambda) * body.volumes().iter().sum::<f64>(),
+        Self::of(std::slice::from_ref(body))
+    }
+
+    /// Of some bodies.
+    pub fn of(bodies: &[Body]) -> Self {
+        let mut all = Self {
+            rest: Vec::new(),
+            tets: Vec::new(),
+            gradients: Vec::new(),
+            volumes: Vec::new(),
+            materials: Vec::new(),
+            masses: Vec::new(),
+            dashpots: Vec::new(),
+            supports: Vec::new(),
+            contact_stiffness: Vec::new(),
+            scale: 0.0,
+        };
+        let mut supported = 0;
+        for body in bodies {
+            let (mu, lambda) = body.material().lame();
+            let (mesh, first) = (body.rest(), all.rest.len());
+            all.rest.extend_from_slice(&mesh.vertices);
+            all.tets.extend(mesh.tets.iter().map(|tet| tet.map(|i| i + first as u32)));
+            all.gradients.extend((0..mesh.tets.len()).map(|t| shape_gradients(mesh, t)));
+            all.volumes.extend_from_slice(body.volumes());
+            all.materials.push((all.tets.len(), body.material().hyperelastic()));
+            all.masses.extend((0..body.len()).map(|i| body.mass(i)));
+            let dashpots = body.dashpots().into_iter();
+            all.dashpots.extend(dashpots.map(|(nodes, damping)| (nodes.map(|i| first + i as usize), damping)));
+            for support in body.supports() {
+                let nodes = first..first + body.len();
+                all.supports.push(Supported { support: support.clone(), nodes, first: supported });
+                supported += body.len();
+            }
+            all.contact_stiffness.extend((0..body.len()).map(|i| body.contact_stiffness(i)));
+            all.scale += (mu + lambda) * body.volumes().iter().sum::<f64>();
         }
+        all
+    }
+
+    /// The material of an element.
+    pub fn psi(&self, t: usize) -> &dyn Hyperelastic {
+        let body = self.materials.partition_point(|(end, _)| *end <= t);
+        self.materials[body].1.as_ref()
     }
 
     /// Deformation gradient of an element.
@@ -56,14 +100,14 @@ impl Elastic {
 /// Elastic energy of a body with its nodes at `x` (J).
 pub fn elastic_energy(body: &Body, x: &[DVec3]) -> f64 {
     let elastic = Elastic::new(body);
-    (0..elastic.tets.len()).map(|t| elastic.volumes[t] * elastic.psi.energy(elastic.deformation(t, x))).sum()
+    (0..elastic.tets.len()).map(|t| elastic.volumes[t] * elastic.psi(t).energy(elastic.deformation(t, x))).sum()
 }
 
 /// The part of a step in time that is added to the elastic energy.
 pub(super) struct Motion {
     dt: f64,
     /// Positions at the beginning (m).
-    start: Vec<DVec3>,
+    pub start: Vec<DVec3>,
     /// Inertial predictor y (m).
     predictor: Vec<DVec3>,
     /// Squared lengths of the dashpots at the beginning (m2).
@@ -77,10 +121,9 @@ impl Motion {
         let start = nodes.x.clone();
         let predictor = start.iter().zip(&nodes.v).map(|(x, v)| x + dt * v + dt * dt * gravity).collect();
         let length = |([i, j], _): &([usize; 2], f64)| (start[*j] - start[*i]).length_squared();
-        let places = match &nodes.anchors[..] {
-            [] => start.repeat(elastic.supports.len()),
-            anchors => anchors.iter().zip(start.iter().cycle()).map(|(anchor, x)| anchor.unwrap_or(*x)).collect(),
-        };
+        let here = elastic.supports.iter().flat_map(|at| &start[at.nodes.clone()]);
+        let place = |(k, x): (usize, &DVec3)| nodes.anchors.get(k).copied().flatten().unwrap_or(*x);
+        let places = here.enumerate().map(place).collect();
         Self { dt, lengths: elastic.dashpots.iter().map(length).collect(), predictor, places, start }
     }
 
@@ -94,7 +137,7 @@ impl Motion {
     }
 }
 
-/// A body's incremental potential.
+/// The incremental potential of a body, or of several that may touch.
 pub(super) struct Potential<'a> {
     pub elastic: &'a Elastic,
     /// None: statics.
@@ -102,6 +145,8 @@ pub(super) struct Potential<'a> {
     pub gravity: DVec3,
     /// Greatest friction of each node at each support (N), support by support; empty: none.
     pub limits: Vec<f64>,
+    /// Contacts with tools and between bodies; None: they pass through each other.
+    pub contacts: Option<Contacts<'a>>,
 }
 
 impl Potential<'_> {
@@ -117,8 +162,8 @@ impl Potential<'_> {
             if ratio.is_nan() || ratio <= 0.0 {
                 return f64::INFINITY;
             }
-            energy += e.volumes[t] * e.psi.energy(f);
-            let stress = e.psi.stress(f) * e.volumes[t];
+            energy += e.volumes[t] * e.psi(t).energy(f);
+            let stress = e.psi(t).stress(f) * e.volumes[t];
             for (i, m) in tet.iter().zip(&e.gradients[t]) {
                 out[*i as usize] += stress * *m;
             }
@@ -146,10 +191,13 @@ impl Potential<'_> {
                 }
             }
         }
-        self.for_contacts(x, |i, contact| {
+        self.for_supports(x, |i, contact| {
             energy += contact.energy;
             out[i] += contact.gradient;
         });
+        if let Some(contacts) = &self.contacts {
+            energy += contacts.gradient(x, |i, gradient| out[i] += gradient);
+        }
         energy
     }
 
@@ -160,7 +208,7 @@ impl Potential<'_> {
         let e = self.elastic;
         into.clear();
         for (t, tet) in e.tets.iter().enumerate() {
-            let mut tangent = tangent(e.psi.as_ref(), e.deformation(t, x));
+            let mut tangent = tangent(e.psi(t), e.deformation(t, x));
             if project {
                 match projected(&tangent) {
                     Some(positive) => tangent = positive,
@@ -190,11 +238,14 @@ impl Potential<'_> {
                 into.add(*j, *i, -block);
             }
         }
-        self.for_contacts(x, |i, contact| {
+        self.for_supports(x, |i, contact| {
             // A field's curvature may make the Hessian indefinite.
             let curvature = if secant || project { DMat3::ZERO } else { contact.curvature };
             into.add(i, i, curvature + if secant { contact.secant } else { contact.hessian });
         });
+        if let Some(contacts) = &self.contacts {
+            contacts.hessian(x, project, secant, into);
+        }
         true
     }
 
@@ -205,46 +256,44 @@ impl Potential<'_> {
             let touch = support.contact(x[i]);
             support.friction() * e.contact_stiffness[i] * -touch.height.min(0.0) * touch.gradient.length()
         };
-        e.supports.iter().flat_map(|support| (0..x.len()).map(move |i| limit(support, i))).collect()
+        e.supports.iter().flat_map(|at| at.nodes.clone().map(move |i| limit(&at.support, i))).collect()
     }
 
-    /// Whether there is friction at all.
+    /// Whether supports rub.
     pub fn rubs(&self) -> bool {
-        self.motion.is_some() && self.elastic.supports.iter().any(|support| support.friction() > 0.0)
+        self.motion.is_some() && self.elastic.supports.iter().any(|at| at.support.friction() > 0.0)
     }
 
     /// Where friction holds each node at each support after a step that ended at x: a node that
     /// pulled harder than the true limit was dragged along.
     pub fn anchors(&self, x: &[DVec3]) -> Vec<Option<DVec3>> {
         let (Some(motion), limits) = (&self.motion, self.friction_limits(x)) else { return Vec::new() };
-        let nodes = x.len();
-        let anchor = |(k, limit): (usize, &f64)| {
-            let (support, i) = (&self.elastic.supports[k / nodes], k % nodes);
+        let anchor = |at: &Supported, i: usize| {
+            let (support, k) = (&at.support, at.first + i - at.nodes.start);
             let gradient = support.contact(motion.start[i]).gradient;
             let (normal, off) = (gradient.normalize_or_zero(), x[i] - motion.places[k]);
-            let slide = off - off.dot(normal) * normal;
-            let most = limit / (self.elastic.contact_stiffness[i] * gradient.length_squared());
-            let length = slide.length();
-            let dragged = if length > most { slide * (1.0 - most / length) } else { DVec3::ZERO };
+            let most = limits[k] / (self.elastic.contact_stiffness[i] * gradient.length_squared());
+            let dragged = rub::dragged(normal, off, most);
             (support.contact(x[i]).height < 0.0).then(|| motion.places[k] + dragged)
         };
-        limits.iter().enumerate().map(anchor).collect()
+        let anchor = &anchor;
+        self.elastic.supports.iter().flat_map(|at| at.nodes.clone().map(move |i| anchor(at, i))).collect()
     }
 
-    fn for_contacts(&self, x: &[DVec3], mut add: impl FnMut(usize, &Contact)) {
-        for (s, support) in self.elastic.supports.iter().enumerate() {
-            for (i, x) in x.iter().enumerate() {
-                let k = s * self.elastic.masses.len() + i;
+    fn for_supports(&self, x: &[DVec3], mut add: impl FnMut(usize, &Contact)) {
+        for at in &self.elastic.supports {
+            for i in at.nodes.clone() {
+                let k = at.first + i - at.nodes.start;
                 let limit = self.limits.get(k).copied().unwrap_or(0.0);
-                let touch = support.contact(*x);
+                let touch = at.support.contact(x[i]);
                 if touch.height < 0.0 || limit > 0.0 {
                     let mut contact = Contact::pressed(&touch, self.elastic.contact_stiffness[i]);
                     if let Some(motion) = self.motion.as_ref().filter(|_| limit > 0.0) {
                         // The plane of friction is that of the step's beginning: it has a potential
                         // then.
-                        let gradient = support.contact(motion.start[i]).gradient;
+                        let gradient = at.support.contact(motion.start[i]).gradient;
                         let stiffness = self.elastic.contact_stiffness[i] * gradient.length_squared();
-                        contact.rub(gradient.normalize_or_zero(), x - motion.places[k], limit, stiffness);
+                        contact.rub(gradient.normalize_or_zero(), x[i] - motion.places[k], limit, stiffness);
                     }
                     add(i, &contact);
                 }
@@ -280,24 +329,12 @@ impl Contact {
         }
     }
 
-    /// Friction with its limit held: a spring towards where it sticks, and the limit beyond, as a
-    /// potential.
+    /// Adds friction with its limit held.
     fn rub(&mut self, normal: DVec3, motion: DVec3, limit: f64, stiffness: f64) {
-        let slide = motion - motion.dot(normal) * normal;
-        let length = slide.length();
-        let across = DMat3::IDENTITY - outer(normal);
-        let (energy, drag, softening) = if length * stiffness < limit {
-            (0.5 * stiffness * length * length, stiffness, 0.0)
-        } else {
-            (limit * (length - 0.5 * limit / stiffness), limit / length, limit / length)
-        };
-        self.energy += energy;
-        self.gradient += drag * slide;
-        self.secant += across * drag;
-        self.hessian += across * drag - outer(slide.normalize_or_zero()) * softening;
+        let rub = rub::Rub::new(normal, motion, limit, stiffness);
+        self.energy += rub.energy;
+        self.gradient += rub.gradient;
+        self.secant += rub.secant;
+        self.hessian += rub.hessian;
     }
-}
-
-fn outer(n: DVec3) -> DMat3 {
-    DMat3::from_cols(n * n.x, n * n.y, n * n.z)
 }

@@ -2,6 +2,7 @@
 
 use crate::{Error, Result};
 use glam::DVec3;
+use std::collections::BTreeMap;
 use trocar_core::Pose;
 use trocar_tissue::{Body, BodyMotion, Grasp, Model, State};
 
@@ -29,6 +30,30 @@ pub struct OracleState {
     /// Simulated time (s).
     pub time: f64,
     pub(crate) bodies: Vec<Nodes>,
+    /// How far friction's springs at tools and between bodies are stretched.
+    pub(crate) stretches: Stretches,
+}
+
+/// How far friction's springs at tools and between bodies are stretched, in the world (m).
+pub(crate) type Stretches = BTreeMap<TouchKey, DVec3>;
+
+/// What a node or feature touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Touched {
+    /// The model's collider of this number.
+    Collider(usize),
+    /// A body.
+    Body(usize),
+}
+
+/// The name of a contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct TouchKey {
+    pub touched: Touched,
+    /// The nodes that touch, among all of the model, ascending.
+    pub nodes: [u32; 3],
+    /// The end of an axis.
+    pub end: u8,
 }
 
 /// A body's nodes.
@@ -49,16 +74,19 @@ impl OracleState {
             let x = body.rest_positions().to_vec();
             Nodes { v: vec![DVec3::ZERO; x.len()], x, anchors: Vec::new() }
         };
-        Self { time: 0.0, bodies: model.bodies().iter().map(at_rest).collect() }
+        Self { time: 0.0, bodies: model.bodies().iter().map(at_rest).collect(), stretches: Stretches::new() }
     }
 
-    /// The motion of a stepper's state, without its grasps; [`Held`] replaces them.
+    /// The motion of a stepper's state, without its grasps; [`Held`] replaces them. Friction at tools
+    /// and between bodies holds everything where it is.
     pub fn from_state(model: &Model, state: &State) -> Self {
         let nodes = |(index, body): (usize, &Body)| Nodes::new(body, &state.motion(model, index));
-        Self { time: state.time, bodies: model.bodies().iter().enumerate().map(nodes).collect() }
+        let bodies = model.bodies().iter().enumerate().map(nodes).collect();
+        Self { time: state.time, bodies, stretches: Stretches::new() }
     }
 
-    /// A stepper's state of the same motion, rounded to `f32`, without grasps. The accelerations
+    /// A stepper's state of the same motion, rounded to `f32`, without grasps and without the stretch
+    /// of friction's springs at tools and between bodies. The accelerations
     /// for the adaptive start are the change of velocity since `before`, the oracle's state a step
     /// of `dt` (s) earlier.
     ///
@@ -131,6 +159,15 @@ impl OracleState {
 }
 
 impl Nodes {
+    /// The nodes of some bodies, one after the other.
+    pub fn joined(bodies: &[Self]) -> Self {
+        Self {
+            x: bodies.iter().flat_map(|b| &b.x).copied().collect(),
+            v: bodies.iter().flat_map(|b| &b.v).copied().collect(),
+            anchors: bodies.iter().flat_map(|b| &b.anchors).copied().collect(),
+        }
+    }
+
     /// The nodes of a stepper's motion.
     pub fn new(body: &Body, motion: &BodyMotion) -> Self {
         Self {

@@ -20,14 +20,20 @@ pub struct Stiffness {
 impl Stiffness {
     /// An empty matrix over the nodes that are not fixed.
     pub fn new(tets: &[[u32; 4]], fixed: &[bool]) -> Self {
+        Self::with_pairs(tets, &[], fixed)
+    }
+
+    /// [`Self::new`], and also with a block for each of these `pairs` of nodes.
+    pub fn with_pairs(tets: &[[u32; 4]], pairs: &[[u32; 2]], fixed: &[bool]) -> Self {
         let mut number = vec![FIXED; fixed.len()];
         let free: Vec<usize> = (0..fixed.len()).filter(|i| !fixed[*i]).collect();
         for (k, i) in free.iter().enumerate() {
             number[*i] = k as u32;
         }
         let corners = tets.iter().map(|tet| tet.map(|i| number[i as usize]));
-        let pairs = corners.flat_map(|tet| (0..4).flat_map(move |a| (0..a).map(move |b| (tet[a], tet[b]))));
-        let matrix = BlockMatrix::new(free.len(), pairs.filter(|(a, b)| *a != FIXED && *b != FIXED));
+        let inner = corners.flat_map(|tet| (0..4).flat_map(move |a| (0..a).map(move |b| (tet[a], tet[b]))));
+        let others = pairs.iter().map(|pair| pair.map(|i| number[i as usize])).map(|[a, b]| (a, b));
+        let matrix = BlockMatrix::new(free.len(), inner.chain(others).filter(|(a, b)| *a != FIXED && *b != FIXED));
         Self { number, free, matrix }
     }
 

@@ -219,8 +219,13 @@ impl Body {
         nodes
     }
 
+    /// Young's modulus times the size of a node (N/m): what contact between bodies is stiff by.
+    pub fn tissue_stiffness(&self, node: usize) -> f64 {
+        f64::from(self.tissue_stiffness_of(self.internal[node] as usize))
+    }
+
     /// Young's modulus times the size of a vertex (N/m).
-    pub(crate) fn tissue_stiffness(&self, vertex: usize) -> f32 {
+    pub(crate) fn tissue_stiffness_of(&self, vertex: usize) -> f32 {
         self.vertices[vertex].contact_stiffness / self.contact_stiffness as f32
     }
 

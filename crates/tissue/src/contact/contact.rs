@@ -1,7 +1,8 @@
 //! A contact as solvers see it: a point of the surface at a plane, with Coulomb friction towards a
 //! place.
 //!
-//! Plane and place are held during a substep, so that no point gets behind a tool within it. A
+//! Plane and place are held during a substep, so that no point gets behind a tool within it. What
+//! pressed before has the plane of where its velocity takes it along the tool. A
 //! spring pushes a point behind the plane out. A second spring of the same stiffness holds it to
 //! its place along the plane, until it would pull harder than Coulomb's law allows: then the place
 //! follows ([`Contact::slide`]). A load below the limit is borne at a fixed displacement; nothing

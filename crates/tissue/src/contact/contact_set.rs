@@ -205,8 +205,15 @@ impl ContactSet {
     }
 
     /// Finds the contacts of the substep between two shares of the frame, of a body whose vertices
-    /// begin it at `x`.
-    pub fn find(&mut self, frame: &Frame<'_>, body: &Body, from: f64, to: f64, x: impl Fn(usize) -> Vec3A) {
+    /// begin it at `x` and go by `way` if their velocities stay (m).
+    pub fn find(
+        &mut self,
+        frame: &Frame<'_>,
+        body: &Body,
+        [from, to]: [f64; 2],
+        x: impl Fn(usize) -> Vec3A,
+        way: impl Fn(usize) -> Vec3A,
+    ) {
         tool_placement::place(frame, body, from, to, &mut self.placed);
         let (mut contacts, mut places) = (std::mem::take(&mut self.contacts), std::mem::take(&mut self.places));
         contacts.clear();
@@ -226,6 +233,15 @@ impl ContactSet {
                     }
                     let known = self.anchors.get(anchor).filter(|a| (a.vertex, a.source) == (*vertex, source));
                     let place = known.map_or(now, |a| a.place);
+                    // What pressed slides with the velocity that it has; what comes may not.
+                    let ahead = match (source, known) {
+                        (Source::Collider(c), Some(_)) => self.placed[c as usize].as_ref().and_then(|placed| {
+                            let there = placed.beside(body, x(i), way(i))?;
+                            Some(placed.plane(&frame.colliders[c as usize], body, now.as_dvec3(), there))
+                        }),
+                        _ => None,
+                    };
+                    let (normal, point) = ahead.unwrap_or((normal, point));
                     let friction = match source {
                         Source::Support(s) => self.supports[s as usize].friction(),
                         Source::Collider(c) => match &self.placed[c as usize] {
@@ -264,7 +280,7 @@ impl ContactSet {
             *first = next;
         }
         self.of_vertices = contacts.len();
-        self.features.find(frame, body, &self.placed, self.reach, x, &mut contacts);
+        self.features.find(frame, body, &self.placed, self.reach, x, way, &mut contacts);
         (self.contacts, self.places) = (contacts, places);
     }
 
@@ -297,7 +313,7 @@ impl ContactSet {
         };
         contacts.reach = f32::INFINITY;
         contacts.near.clone_from(&contacts.surface);
-        contacts.find(&frame, body, 0.0, 1.0, |i| x[i]);
+        contacts.find(&frame, body, [0.0, 1.0], |i| x[i], |_| Vec3A::ZERO);
         contacts
     }
 

@@ -80,7 +80,9 @@ impl FeatureContacts {
         self.vertices.dedup();
     }
 
-    /// Appends the contacts of a substep that begins with the vertices at `x`.
+    /// Appends the contacts of a substep that begins with the vertices at `x`, which go by `way` if
+    /// their velocities stay (m).
+    #[expect(clippy::too_many_arguments, reason = "what a substep begins with")]
     pub fn find(
         &mut self,
         frame: &Frame<'_>,
@@ -88,6 +90,7 @@ impl FeatureContacts {
         placed: &[Option<Placed>],
         reach: f32,
         x: impl Fn(usize) -> Vec3A,
+        way: impl Fn(usize) -> Vec3A,
         contacts: &mut Vec<Contact>,
     ) {
         self.keys.clear();
@@ -104,22 +107,27 @@ impl FeatureContacts {
             let far = reach + placed.reach + radius;
             let on_axis = placed.at_beginning(body, ends);
             tool_features::find(&body.surface, &self.x, triangles, on_axis, far, &mut self.found);
-            for Feature { key, site } in &self.found {
-                let now = site.at(|vertex| self.x[vertex as usize]);
-                let p = placed.from.transform(body.origin + now.as_dvec3());
-                let nearest = collider.shape.nearest(p);
-                let height = nearest.distance - collider.rest_offset;
-                let local = |place: DVec3| (placed.to.transform(place) - body.origin).as_vec3a();
-                let by = |anchor: &FeatureAnchor| (anchor.collider, anchor.feature).cmp(&(c as u32, *key));
+            for feature in &self.found {
+                let by = |anchor: &FeatureAnchor| (anchor.collider, anchor.feature).cmp(&(c as u32, feature.key));
                 let known = self.anchors.binary_search_by(by).map(|k| self.anchors[k].stretch);
-                self.keys.push(*key);
+                let Feature { key, site } = *feature;
+                let x = |i: u32| self.x[i as usize];
+                // What pressed slides with the velocity that it has; what comes may not. Only its
+                // plane is that ahead: a site ahead would swing with every velocity.
+                let ahead = |i: u32| placed.beside(body, x(i), way(i as usize)).unwrap_or(x(i));
+                let there = known.ok().and_then(|_| feature.moved(ahead, on_axis)).map(|site| site.at(ahead));
+                let now = site.at(x);
+                let p = placed.from.transform(body.origin + now.as_dvec3());
+                let (normal, point) = placed.plane(collider, body, p, there.unwrap_or(now));
+                let local = |place: DVec3| (placed.to.transform(place) - body.origin).as_vec3a();
+                self.keys.push(key);
                 contacts.push(Contact {
-                    site: *site,
+                    site,
                     source: Source::Collider(c as u32),
-                    normal: (placed.to.rotation * nearest.normal).as_vec3a(),
-                    point: local(p - height * nearest.normal),
+                    normal,
+                    point,
                     place: local(p - known.unwrap_or(Vec3A::ZERO).as_dvec3()),
-                    stiffness: stiffness(body, site),
+                    stiffness: stiffness(body, &site),
                     friction: Friction::Coulomb(if placed.grips { 0.0 } else { collider.friction as f32 }),
                 });
             }

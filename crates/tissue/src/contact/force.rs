@@ -4,7 +4,7 @@ use trocar_core::Wrench;
 
 impl ToolForce {
     /// Adds the forces of another body.
-    pub(crate) fn add(&mut self, other: &Self) {
+    pub fn add(&mut self, other: &Self) {
         for (sum, part) in [(&mut self.contact, &other.contact), (&mut self.constraint, &other.constraint)] {
             *sum += *part;
         }

@@ -124,7 +124,7 @@ impl Pairs {
             let (one, two) = (island.body(a), island.body(b));
             let stretches = &island.state(a).stretches;
             let known = stretches.binary_search_by_key(&(near.vertex, near.other), |s| (s.vertex, s.other));
-            let stiffness = |body: &Body, vertex: u32| body.tissue_stiffness(vertex as usize);
+            let stiffness = |body: &Body, vertex: u32| body.tissue_stiffness_of(vertex as usize);
             let theirs: f32 = near.triangle.iter().zip(near.weights).map(|(c, w)| w * stiffness(two, *c)).sum();
             let ours = stiffness(one, near.vertex);
             self.candidates.push(Pair {

@@ -33,6 +33,23 @@ pub(super) struct Feature {
     pub site: Site,
 }
 
+impl Feature {
+    /// The feature's site where its vertices are at `x`; None if it is not nearest to the axis there.
+    pub fn moved(&self, x: impl Fn(u32) -> Vec3A, axis: [Vec3A; 2]) -> Option<Site> {
+        let vertices = self.site.vertices;
+        let inside = |share: &f32| *share > 0.0 && *share < 1.0;
+        let weights = if vertices[2] == vertices[0] {
+            let ends = [x(vertices[0]).as_dvec3(), x(vertices[1]).as_dvec3()];
+            let share = nearest_of_segments(ends, axis.map(|p| p.as_dvec3()))[0] as f32;
+            inside(&share).then_some([1.0 - share, share, 0.0])?
+        } else {
+            let foot = foot(axis[usize::from(self.key.1)], vertices.map(x));
+            foot.weights.iter().all(inside).then_some(foot.weights)?
+        };
+        Some(Site { vertices, weights })
+    }
+}
+
 /// The features of `triangles` of a surface, vertices at `x`, within `reach` (m) of the axis from
 /// `a` to `b`, each once, by key.
 pub(super) fn find(

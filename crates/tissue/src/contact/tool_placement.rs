@@ -6,6 +6,16 @@ use crate::{Body, Collider, Grasp};
 use glam::{DVec3, Vec3A};
 use trocar_core::Pose;
 
+/// What slides by less than this in a substep (m) sticks.
+const LEAST_SLIP: f32 = 1e-7;
+
+/// What slides by more than this share of a tool's size in a substep is not looked for ahead.
+const LONGEST_SLIP: f32 = 0.3;
+
+/// Cosine of the greatest angle by which a plane turns ahead of what slides; beyond it, the place is
+/// another side of the tool.
+const LEAST_TURN_COSINE: f64 = 0.9;
+
 /// Places the colliders of a substep between two shares of the frame; None: the tool has no motion.
 pub(super) fn place(frame: &Frame<'_>, body: &Body, from: f64, to: f64, placed: &mut Vec<Option<Placed>>) {
     placed.clear();
@@ -46,6 +56,33 @@ impl Placed {
             reach: (collider.rest_offset + travel(&from, &to, arm)) as f32,
             grips,
         }
+    }
+
+    /// Normal and point of the plane at the substep's end, in the frame of `body`, of a place that is
+    /// at `p` in the tool's frame and is expected `there` ([`Self::beside`]).
+    ///
+    /// The plane of where it is now lags behind what slides: on a tool of 3 mm that is dragged at 6
+    /// mm/s it leans by a degree, and pulls by a sixtieth of the normal force.
+    pub fn plane(&self, collider: &Collider, body: &Body, p: DVec3, there: Vec3A) -> (Vec3A, Vec3A) {
+        let here = collider.shape.nearest(p);
+        let ahead = self.from.transform(body.origin + there.as_dvec3());
+        let nearest = collider.shape.nearest(ahead);
+        let (place, nearest) =
+            if nearest.normal.dot(here.normal) > LEAST_TURN_COSINE { (ahead, nearest) } else { (p, here) };
+        let height = nearest.distance - collider.rest_offset;
+        let point = self.to.transform(place - height * nearest.normal) - body.origin;
+        ((self.to.rotation * nearest.normal).as_vec3a(), point.as_vec3a())
+    }
+
+    /// Where a vertex at `x` that goes by `way` (m) will be beside the collider at the substep's end,
+    /// moved back with the tool to the beginning; in the frame of `body`. None where it sticks, or
+    /// goes too far to be trusted.
+    pub fn beside(&self, body: &Body, x: Vec3A, way: Vec3A) -> Option<Vec3A> {
+        let end = self.to.inverse().transform(body.origin + (x + way).as_dvec3());
+        let ahead = (self.from.inverse().transform(end) - body.origin).as_vec3a();
+        let slip = (ahead - x).length_squared();
+        let most = LONGEST_SLIP * self.radius;
+        (slip > LEAST_SLIP * LEAST_SLIP && slip < most * most).then_some(ahead)
     }
 
     /// Points of the collider at the substep's beginning, in the frame of `body` (m).

@@ -54,7 +54,8 @@ impl Solver for TouchingDescent {
         let IslandFrame { slots, pairs, frame, h, .. } = island;
         pairs.find(&**slots, *h, |_| false);
         for BodySlot { index, body, solver, state, .. } in slots.iter_mut() {
-            solver.contacts.find(&frame.of(*index), body, from, to, |i| state.x[i]);
+            let way = |i: usize| *h * state.v[i];
+            solver.contacts.find(&frame.of(*index), body, [from, to], |i| state.x[i], way);
         }
         sweep_substep(slots, pairs, frame, to);
         for BodySlot { index, body, solver, state, .. } in slots.iter_mut() {

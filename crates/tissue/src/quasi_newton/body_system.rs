@@ -186,10 +186,11 @@ impl QuasiNewtonSolver {
         new
     }
 
-    /// Finds the contacts of the substep between two shares of the frame.
-    pub fn find_contacts(&mut self, frame: &Frame<'_>, body: &Body, from: f64, to: f64) {
+    /// Finds the contacts of the substep of `h` (s) between two shares of the frame.
+    pub fn find_contacts(&mut self, frame: &Frame<'_>, body: &Body, shares: [f64; 2], h: f32) {
         let Self { iterate, layout, touching: Touching { contacts, limits, .. }, .. } = self;
-        contacts.find(frame, body, from, to, |vertex| iterate.at(layout, vertex as u32));
+        let way = |vertex: usize| h * iterate.velocity(layout, vertex as u32);
+        contacts.find(frame, body, shares, |vertex| iterate.at(layout, vertex as u32), way);
         limits.clear();
         limits.resize(contacts.list().len(), 0.0);
     }

@@ -92,6 +92,13 @@ impl Iterate {
     pub fn at(&self, layout: &Layout, vertex: u32) -> Vec3A {
         position(&self.x[layout.number[vertex as usize] as usize])
     }
+
+    /// Velocity of a vertex (m/s).
+    #[inline(always)]
+    pub fn velocity(&self, layout: &Layout, vertex: u32) -> Vec3A {
+        let number = layout.number[vertex as usize] as usize;
+        if number < layout.free { position(&self.v[number]) } else { Vec3A::ZERO }
+    }
 }
 
 /// The three coordinates of a row.

@@ -1,13 +1,13 @@
-//! Friction, which has no potential: minimise with its limits held, update them, until the forces
-//! of the true law balance.
+//! What has no potential (friction, and which features of a surface touch) is held: minimise, find
+//! it again, until the forces of the true law balance.
 
 use super::newton::{Solver, norm};
 use super::potential::Potential;
 use super::solution::{Failure, Solution};
 use glam::DVec3;
 
-/// Greatest number of updates of the limits.
-const MAX_FRICTION_ROUNDS: usize = 100;
+/// Greatest number of updates of what is held.
+const MAX_ROUNDS: usize = 100;
 
 /// Share of the true law's imbalance to which a round minimises.
 const INNER_SHARE: f64 = 0.1;
@@ -22,21 +22,29 @@ pub(super) fn minimise(
     x: &mut [DVec3],
 ) -> Result<Solution, Failure> {
     let rubs = potential.rubs();
+    if let Some(contacts) = &mut potential.contacts {
+        contacts.hold(x, false);
+    }
     // Limits of the beginning may be far from those of the end: the first round has none.
     let guess = potential.motion.as_ref().map(|motion| motion.dt());
     let load_steps = solver.move_fixed(potential, fixed, targets, guess.map(|dt| (dt, velocities)), x)?;
     let tolerance = solver.tolerance();
     let mut solution = solver.minimise(potential, fixed, tolerance, x)?;
     solution.load_steps = load_steps;
-    if !rubs {
+    if !rubs && potential.contacts.is_none() {
         return Ok(solution);
     }
     let mut gradient = vec![DVec3::ZERO; x.len()];
-    for _ in 0..MAX_FRICTION_ROUNDS {
-        potential.limits = potential.friction_limits(x);
+    for _ in 0..MAX_ROUNDS {
+        if rubs {
+            potential.limits = potential.friction_limits(x);
+        }
+        if let Some(contacts) = &mut potential.contacts {
+            contacts.hold(x, true);
+        }
         potential.gradient(x, &mut gradient);
         solution.gradient = norm(&gradient, fixed);
-        if solution.gradient <= tolerance {
+        if solution.gradient <= tolerance && potential.contacts.as_ref().is_none_or(|c| c.is_sharp()) {
             return Ok(solution);
         }
         // Held limits need no more precision than they are true.
