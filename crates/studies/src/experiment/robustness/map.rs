@@ -44,7 +44,7 @@ pub(super) fn map(policies: &[&str], curves: &[Curve]) -> String {
         for (v, bin) in curve.bins.iter().enumerate() {
             for (k, share) in bin.policies.iter().enumerate() {
                 let x = (NAMES + k * column) as f64 + v as f64 * wide;
-                draw(&mut svg, [x, (y + 3) as f64], wide, bin, share, hex(colors::organ(k)));
+                draw(&mut svg, [x, (y + 3) as f64], wide, bin, share, &hex(colors::organ(k)));
             }
         }
     }
@@ -64,7 +64,7 @@ fn ends(bins: &[Bin]) -> String {
     }
 }
 
-fn draw(svg: &mut String, [x, y]: [f64; 2], wide: f64, bin: &Bin, share: &Share, color: String) {
+fn draw(svg: &mut String, [x, y]: [f64; 2], wide: f64, bin: &Bin, share: &Share, color: &str) {
     // Neighbouring boxes do not touch.
     let (width, full) = ((0.88 * wide).max(1.0), BOX as f64);
     let high = full * share.interval.share;
