@@ -54,17 +54,18 @@ class LiftCells(VecEnv):
     An action moves the left arm only, for 0.2 s.
     """
 
-    def __init__(self, cells: int, seconds: float, seed: int):
+    def __init__(self, options: argparse.Namespace, seed: int, split: str):
+        cells = options.cells
         envs = gym.make_vec(
             "trocar/GraspLift-v0",
             num_envs=cells,
             vectorization_mode="vector_entry_point",
             autoreset_mode="same-step",
-            episode_s=seconds,
+            episode_s=options.seconds,
             privileged=True,
-            # The fixed cell, in which only the starts of the arms vary.
-            variation="none",
-            split="both",
+            variation=options.variation,
+            split=split,
+            threads=options.threads,
         )
         # Its own attributes are not in Gymnasium's types.
         self.cells = cast(Any, envs)
@@ -289,15 +290,16 @@ def demonstrations(envs: LiftCells, episodes: int) -> tuple[ReplayBuffer, list[b
     return kept, passed
 
 
-def test(model: SAC, cells: int, seconds: float, episodes: int) -> list[bool]:
-    """Which of `episodes` new episodes the policy passes without exploration.
+def test(model: SAC, options: argparse.Namespace) -> list[bool]:
+    """Which unseen episodes the policy passes without exploration.
 
     The number of episodes of each cell is fixed beforehand: episodes that pass end early, so the
     first ones to end are a biased sample.
     """
-    envs = LiftCells(cells, seconds, seed=1_000_000)
-    left = np.full(cells, episodes // cells)
-    left[: episodes % cells] += 1
+    envs = LiftCells(options, 1_000_000, "unseen")
+    cells = options.cells
+    left = np.full(cells, options.test // cells)
+    left[: options.test % cells] += 1
     seen, passed = envs.reset(), []
     while left.any():
         envs.step_async(model.predict(seen, deterministic=True)[0])
@@ -376,14 +378,23 @@ def main() -> None:
     parser.add_argument(
         "--seconds", type=float, default=7.0, help="maximum duration of an episode (s)"
     )
-    parser.add_argument("--test", type=int, default=20, help="new episodes of the test at the end")
+    parser.add_argument(
+        "--test", type=int, default=20, help="unseen episodes of the test at the end"
+    )
+    parser.add_argument(
+        "--variation",
+        default="none",
+        help="what varies: none (the fixed cell, in which only the starts of the arms vary), easy, "
+        "standard or hard (default: %(default)s)",
+    )
+    parser.add_argument("--threads", type=int, default=0, help="0 for as many as there are cores")
     parser.add_argument("--updates", type=int, default=6, help="gradient steps a decision")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("-o", "--output", type=Path, default=Path("grasp_lift.png"))
     options = parser.parse_args()
     torch.set_num_threads(1)
 
-    envs = LiftCells(options.cells, options.seconds, options.seed)
+    envs = LiftCells(options, options.seed, "seen")
     model = SAC(
         "MlpPolicy",
         envs,
@@ -429,8 +440,8 @@ def main() -> None:
     )
     draw(rows, options.output, script)
     if options.test:
-        passed = test(model, options.cells, options.seconds, options.test)
-        print(f"after: {sum(passed)} of {len(passed)} new episodes passed, without exploration")
+        passed = test(model, options)
+        print(f"after: {sum(passed)} of {len(passed)} unseen episodes passed, without exploration")
     print(f"written: {options.output}")
 
 

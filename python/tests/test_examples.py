@@ -71,7 +71,8 @@ def test_the_test_of_the_learned_policy_takes_equally_many_episodes_of_each_cell
 
     monkeypatch.setattr(learning, "LiftCells", Cells)
     model = types.SimpleNamespace(predict=lambda seen, deterministic: (np.zeros((3, 5)), None))
-    passed = learning.test(model, 3, 7.0, episodes)
+    options = types.SimpleNamespace(cells=3, test=episodes)
+    passed = learning.test(model, options)
     assert len(passed) == episodes and sum(passed) == -(-episodes // 3)
 
 

@@ -1,7 +1,8 @@
 //! Shares of episodes as bars with their Wilson intervals, in rows and columns, as inline SVG.
 
 use crate::curves::Curve;
-use crate::table::{CampaignResult, Interval};
+use crate::interval::Interval;
+use crate::table::CampaignResult;
 use std::fmt::Write;
 use trocar_report::colors;
 use trocar_report::page::{escape, hex};

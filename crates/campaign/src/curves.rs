@@ -1,8 +1,8 @@
 //! Robustness curves: the share of episodes that passed, by the values of a factor.
 
 use crate::by::{By, Value};
+use crate::interval::Interval;
 use crate::store::EpisodeRecord;
-use crate::table::Interval;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

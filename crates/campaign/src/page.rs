@@ -6,13 +6,13 @@ use crate::manifest::Manifest;
 use crate::outcomes::repeats;
 use crate::plots;
 use crate::store::{EpisodeRecord, Store};
-use crate::table::{CampaignResult, Interval, PolicyRow};
+use crate::table::{CampaignResult, PolicyRow};
 use crate::variation_page;
 use crate::videos;
 use trocar_report::document::Table;
 use trocar_report::figures;
 use trocar_report::page::{self, Card, Columns};
-use trocar_report::table::{fixed, or_dash, percent};
+use trocar_report::table::{fixed, or_dash};
 use trocar_workflow::{Result, counted};
 
 /// Maximum number of failures in the list.
@@ -101,14 +101,10 @@ fn sentence(words: &str) -> String {
     letters.next().map_or_else(String::new, |first| format!("{}{}.", first.to_uppercase(), letters.as_str()))
 }
 
-pub(super) fn share(i: &Interval) -> String {
-    format!("{} ({}\u{2013}{})", percent(i.share, 0), percent(i.low, 0), percent(i.high, 0))
-}
-
 fn cards(manifest: &Manifest, r: &CampaignResult) -> String {
     let mut all: Vec<Card> = Vec::new();
     if let [only] = r.policies.as_slice() {
-        all.push(Card::new("Passed", format!("{} of {}", only.passed, only.episodes), share(&only.interval)));
+        all.push(Card::new("Passed", format!("{} of {}", only.passed, only.episodes), only.interval.in_percent()));
     // The reverse makes the first of equals win.
     } else if let Some(best) = r.policies.iter().rev().max_by(|a, b| a.mean_score.total_cmp(&b.mean_score)) {
         let note = format!("passed {} of {}", best.passed, best.episodes);
@@ -150,7 +146,7 @@ fn outcome(r: &CampaignResult) -> String {
             ("policy", &|p| p.policy.clone()),
             ("episodes", &|p| p.episodes.to_string()),
             ("distinct", &|p| p.distinct_outcomes.to_string()),
-            ("passed", &|p| format!("{}, {}", p.passed, share(&p.interval))),
+            ("passed", &|p| format!("{}, {}", p.passed, p.interval.in_percent())),
             ("mean score", &|p| fixed(p.mean_score, 2)),
             ("not passed in time", &|p| (p.ends.time_out + p.ends.finished + p.ends.aborted).to_string()),
             ("RCM abort", &|p| p.ends.rcm_abort.to_string()),
@@ -175,7 +171,7 @@ fn failures(manifest: &Manifest, records: &[EpisodeRecord], store: &Store) -> Re
     if failed.is_empty() {
         return Ok(page::section("Failures", "There were none.", ""));
     }
-    let stopped = |k: &EpisodeRecord| format!("stopped at {}: {}", k.summary.next, why(k));
+    let stopped = |k: &EpisodeRecord| format!("stopped at {}: {}", k.summary.next, k.why());
     let videos: Vec<String> = failed.iter().filter_map(|k| video(store, k, &stopped(k))).collect();
     let table = Table::of(
         failed.iter().take(MAX_LISTED),
@@ -185,7 +181,7 @@ fn failures(manifest: &Manifest, records: &[EpisodeRecord], store: &Store) -> Re
             ("stages", &|k| format!("{} of {}", k.summary.stage, k.summary.progress.stages.len())),
             ("stopped at", &|k| k.summary.next.clone()),
             ("score", &|k| fixed(k.summary.score, 2)),
-            ("why", &|k| why(k)),
+            ("why", &|k| k.why()),
             ("folder", &|k| format!("episodes/{}/{:06}", k.name, k.index)),
         ],
     );
@@ -219,11 +215,6 @@ fn video(store: &Store, k: &EpisodeRecord, caption: &str) -> Option<String> {
     let name = format!("{} with seed {}", k.name, k.seed);
     let img = figures::img_of_bytes("webp", &bytes, width, height, &name);
     Some(page::figure(&img, &format!("<b>{}</b> {}", page::escape(&name), page::escape(caption))))
-}
-
-pub(super) fn why(k: &EpisodeRecord) -> String {
-    let end = || k.summary.end.as_ref().map_or("no end".to_owned(), ToString::to_string);
-    k.summary.why.clone().unwrap_or_else(end)
 }
 
 /// Median times at which the stages passed.

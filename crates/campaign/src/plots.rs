@@ -2,10 +2,10 @@
 
 use crate::bars;
 use crate::curves::Curve;
+use crate::interval::Interval;
 use crate::manifest::Manifest;
 use crate::policy_spec::PolicySpec;
 use crate::store::{EpisodeRecord, Store};
-use crate::table::Interval;
 use trocar_report::colors;
 use trocar_report::page;
 use trocar_report::plots::{Line, Plot};

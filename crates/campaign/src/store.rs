@@ -75,6 +75,12 @@ impl EpisodeRecord {
         arms.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, lag)| lag)
     }
 
+    /// Why it did not pass, in words; how it ended where nothing says why.
+    pub(crate) fn why(&self) -> String {
+        let end = || self.summary.end.as_ref().map_or("no end".to_owned(), ToString::to_string);
+        self.summary.why.clone().unwrap_or_else(end)
+    }
+
     /// The maximum of `of` over the arms.
     pub(crate) fn peak(&self, of: fn(&ArmSummary) -> f64) -> f64 {
         self.summary.arms.iter().map(of).fold(0.0, f64::max)

@@ -4,10 +4,9 @@
 use crate::curves::{Curve, significant};
 use crate::drawn_result::words;
 use crate::manifest::Manifest;
-use crate::page::{share, why};
 use crate::plots;
 use crate::store::EpisodeRecord;
-use crate::table::{CampaignResult, Interval};
+use crate::table::CampaignResult;
 use std::collections::BTreeMap;
 use trocar_report::document::Table;
 use trocar_report::page::{self, Columns};
@@ -112,9 +111,8 @@ fn by_value(curve: &Curve) -> String {
     let Some(first) = curve.bins.first() else { return String::new() };
     let names = first.policies.iter().map(|s| s.policy.as_str());
     let head = std::iter::once(curve.label.as_str()).chain(names);
-    let said = |passed: usize, all: usize, i: &Interval| format!("{passed}/{all}, {}", share(i));
     let row = |bin: &crate::curves::Bin| {
-        let cells = bin.policies.iter().map(|s| said(s.passed, s.episodes, &s.interval));
+        let cells = bin.policies.iter().map(|s| format!("{}/{}, {}", s.passed, s.episodes, s.interval.in_percent()));
         std::iter::once(bin.value.clone()).chain(cells).collect::<Vec<_>>()
     };
     Table::new(head, curve.bins.iter().map(row).collect()).html()
@@ -141,7 +139,7 @@ pub(super) fn episodes(records: &[EpisodeRecord]) -> String {
             Split::of_seed(k.seed).name().to_owned(),
             yes_or_no(s.passed),
             format!("{} of {}", s.stage, s.progress.stages.len()),
-            if s.passed { "passed".to_owned() } else { why(k) },
+            if s.passed { "passed".to_owned() } else { k.why() },
             format!("{}/{}/{}", s.disabled_contacts, s.disabled_blades, s.relaxed),
             drawn.map_or("\u{2013}".to_owned(), |d| d.specimen.label()),
         ];

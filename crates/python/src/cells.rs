@@ -5,7 +5,7 @@ use crate::frames::Rows;
 use crate::pictures::Eyes;
 use crate::prepare;
 use crate::progress::Signals;
-use crate::view::Viewers;
+use crate::viewers::Viewers;
 use numpy::{PyArray1, PyArray3, PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;

@@ -17,6 +17,7 @@ mod prepare;
 mod progress;
 mod recorded;
 mod view;
+mod viewers;
 
 use pyo3::prelude::*;
 

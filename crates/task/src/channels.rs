@@ -31,6 +31,11 @@ macro_rules! row {
     };
 }
 
+/// A flag as a row holds it.
+pub(crate) fn flag(is: bool) -> f64 {
+    f64::from(u8::from(is))
+}
+
 row! {
     /// One arm in a period; all zero where the scene has no such arm. Flags are 0 or 1.
     ArmChannels {

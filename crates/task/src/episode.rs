@@ -1,8 +1,9 @@
 //! An episode: a scene's cell from a seeded start to an end, with what a policy sees, what is
 //! scored and what happened.
 
+use crate::bodies::bodies_of;
 use crate::facts::Facts;
-use crate::measure::{Subject, bodies_of};
+use crate::measure::Subject;
 use crate::measures::Measures;
 use crate::stages::Tracker;
 use crate::start::{starts, targets};

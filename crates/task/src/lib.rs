@@ -4,6 +4,7 @@
 //! [`Channels`]; stages, sweeps and summaries are functions of rows alone. An episode file holds
 //! the actions and a hash a step, so that anyone can run it again and compare.
 
+mod bodies;
 mod bounds;
 mod channels;
 mod end;

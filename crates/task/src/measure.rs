@@ -1,14 +1,12 @@
 //! From a cell to a row of channels.
 
-use crate::channels::{ArmChannels, TaskChannels};
+use crate::bodies::{MID_JAWS, between_blades, bodies_of, nearest};
+use crate::channels::{ArmChannels, TaskChannels, flag};
 use crate::measures::Measures;
 use crate::{Channels, Result};
 use glam::{DQuat, DVec3};
 use trocar_cell::{ArmObservation, Cell, CellEvent, CellReport};
 use trocar_scene::{Gates, InstrumentKind, Side};
-
-/// Middle of the region between the blades from the pivot (m).
-pub(crate) const MID_JAWS: f64 = 0.0115;
 
 /// Jaw lift below which no follow ratio is told (m).
 const MIN_JAW_LIFT: f64 = 1e-4;
@@ -132,35 +130,9 @@ impl Subject {
     }
 }
 
-/// The bodies that an organ is in: its pieces after a cut are called `name.1` and so on.
-pub(crate) fn bodies_of(cell: &Cell, organ: &str) -> Vec<usize> {
-    let is = |name: &str| name.strip_prefix(organ).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-    let bodies = cell.world().model.bodies().iter().enumerate();
-    bodies.filter(|(_, b)| is(b.name())).map(|(k, _)| k).collect()
-}
-
-pub(crate) fn flag(is: bool) -> f64 {
-    f64::from(u8::from(is))
-}
-
 /// Of the two quaternions of a rotation the one whose scalar is not negative.
 pub(crate) fn upright(q: DQuat) -> DQuat {
     if q.w < 0.0 { -q } else { q }
-}
-
-/// Distance from `p` to the nearest node of a body among those `of` (m); infinite without any.
-pub(crate) fn nearest(cell: &Cell, body: usize, p: DVec3, of: impl Fn(usize) -> bool) -> f64 {
-    let world = cell.world();
-    let count = world.model.bodies()[body].len();
-    let square = |i: usize| world.state.position(&world.model, body, i).distance_squared(p);
-    (0..count).filter(|i| of(*i)).map(square).fold(f64::INFINITY, f64::min).sqrt()
-}
-
-/// Whether any of `bodies` is between the blades of arm `k`, and the share of the wedge that they
-/// fill.
-pub(crate) fn between_blades(cell: &Cell, k: usize, bodies: &[usize]) -> (bool, f64) {
-    let all: Vec<f64> = bodies.iter().filter_map(|body| Some(cell.between_blades(k, *body)?.1)).collect();
-    (!all.is_empty(), all.iter().sum::<f64>().min(1.0))
 }
 
 fn arm_channels(cell: &Cell, k: usize, arm: &ArmObservation, bodies: &[usize]) -> Result<ArmChannels> {

@@ -1,6 +1,7 @@
 //! What a task measures beside the channels: distances, displacements and what is held where.
 
-use crate::measure::{MID_JAWS, between_blades, bodies_of, flag, nearest};
+use crate::bodies::{MID_JAWS, between_blades, bodies_of, nearest};
+use crate::channels::flag;
 use crate::visible::{Surface, View};
 use crate::{Channels, Result};
 use glam::DVec3;

@@ -1,7 +1,7 @@
 //! What a camera sees of a part of an organ: a small depth picture of all organs and of the
 //! instruments' shafts, and beside it one of the part alone.
 
-use crate::measure::bodies_of;
+use crate::bodies::bodies_of;
 use crate::{Error, Result};
 use glam::DVec3;
 use std::sync::Arc;

@@ -2,6 +2,7 @@
 
 import * as THREE from "three";
 import type { Session } from "../wire/session.ts";
+import { setPose } from "./pose.ts";
 import { LAYER_OUTSIDE, type World } from "./world.ts";
 
 /** Meshes that the endoscope does not see, because they hold it. */
@@ -89,12 +90,6 @@ export class Bodies {
     this.moving = [];
     this.named.clear();
   }
-}
-
-/** Sets an object's pose from seven numbers: x y z, then the quaternion w x y z. */
-export function setPose(object: THREE.Object3D, pose: ArrayLike<number>, at: number): void {
-  object.position.set(pose[at] ?? 0, pose[at + 1] ?? 0, pose[at + 2] ?? 0);
-  object.quaternion.set(pose[at + 4] ?? 0, pose[at + 5] ?? 0, pose[at + 6] ?? 0, pose[at + 3] ?? 1).normalize();
 }
 
 /** Linear colours (0 to 1) from sRGB bytes. */

@@ -2,8 +2,8 @@
 
 import * as THREE from "three";
 import type { CameraModel } from "../wire/messages.ts";
-import { setPose } from "./bodies.ts";
 import { Lens } from "./lens.ts";
+import { setPose } from "./pose.ts";
 
 const NEAR_M = 0.002;
 const FAR_M = 3;

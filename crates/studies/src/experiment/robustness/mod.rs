@@ -2,6 +2,7 @@
 //! as the scene is written, and all factors together.
 
 mod condition;
+mod map;
 mod page;
 mod result;
 

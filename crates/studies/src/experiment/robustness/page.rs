@@ -1,28 +1,35 @@
 //! The page of the study.
 
+use super::map::map;
 use super::result::{PolicyOutcome, RobustnessResult, RobustnessRow};
 use crate::Result;
 use crate::trials::resumed;
 use trocar_campaign::{Curve, success_by_name, success_over};
 use trocar_report::document::{Document, Section, Table};
-use trocar_report::page::{self, Card};
+use trocar_report::page::{self, Card, Columns};
 use trocar_report::table::{count, fixed};
+use trocar_workflow::counted;
 
 pub(super) fn document(r: &RobustnessResult) -> Result<Document> {
     let subtitle = "Success of six controllers over each factor of variation";
-    let mut document = Document::new("Robustness", subtitle).with(outcome(r)).with(one_at_a_time(r));
-    let mut figures = Vec::new();
-    for curve in r.curves() {
-        let policies = names(&curve);
-        figures.push(if curve.bins.iter().all(|bin| bin.numbers.is_some()) {
-            success_over(&policies, &curve)?
+    let curves = r.curves();
+    let document = Document::new("Robustness", subtitle).with(outcome(r)).with(one_at_a_time(r, &curves));
+    Ok(document.with(with_intervals(&curves)?).with(all(r)))
+}
+
+/// The curves with their intervals, folded: the map has the shares.
+fn with_intervals(curves: &[Curve]) -> Result<Section> {
+    let (mut wide, mut figures) = (String::new(), Vec::new());
+    for curve in curves {
+        if curve.bins.iter().all(|bin| bin.numbers.is_some()) {
+            figures.push(success_over(&names(curve), curve)?);
         } else {
-            success_by_name(&curve)
-        });
+            wide += &success_by_name(curve);
+        }
     }
-    let lead = "Share of episodes that passed. Whiskers: Wilson, 95%.";
-    document = document.with(Section::new("Curves", lead).figures(figures));
-    Ok(document.with(all(r)))
+    let body = wide + &page::grid(Columns::Two, &figures);
+    let lead = "Share of episodes that passed, for each factor. Whiskers: Wilson, 95%.";
+    Ok(Section::new("Intervals", lead).html(page::fold("All factors", &body)))
 }
 
 fn names(curve: &Curve) -> Vec<&str> {
@@ -49,7 +56,8 @@ fn outcome(r: &RobustnessResult) -> Section {
         ),
     ];
     let lead = format!(
-        "Scene {}, ranges of the set {}. Episodes are unseen ones, from number {} on.",
+        "Scene {}, ranges of the set {}. Episodes are unseen ones, from number {} on; with all factors together also \
+         seen ones.",
         page::escape(&r.scene),
         r.variation,
         r.seed
@@ -68,22 +76,35 @@ fn summary(name: &str, row: &RobustnessRow) -> Vec<String> {
     std::iter::once(name.to_owned()).chain(cells).collect()
 }
 
-fn one_at_a_time(r: &RobustnessResult) -> Section {
+fn one_at_a_time(r: &RobustnessResult, curves: &[Curve]) -> Section {
     let lead = format!(
-        "Each factor at its values in order, with all others as the scene is written: episodes of {} that passed. The \
+        "Each factor at its values, with all others as the scene is written; {} of each controller at a value. The \
          controllers see no pictures: factors of pictures are left out, unless the task is judged by a picture.",
-        r.episodes
+        counted(r.episodes, "episode")
     );
-    let curves = r.curves();
     let policies = curves.first().map_or_else(Vec::new, names);
-    let head = ["factor", "values"].into_iter().chain(policies);
+    let head = ["factor", "values"].into_iter().chain(policies.iter().copied());
     let row = |curve: &Curve| {
-        let values = curve.bins.iter().map(|bin| bin.value.clone()).collect::<Vec<_>>().join(", ");
-        let cell = |k: usize| curve.bins.iter().map(|b| b.policies[k].passed.to_string()).collect::<Vec<_>>().join(" ");
+        let numbers = curve.bins.iter().all(|bin| bin.numbers.is_some());
+        let values = match curve.bins.as_slice() {
+            bins if numbers => bins.iter().map(|bin| bin.value.clone()).collect::<Vec<_>>().join(", "),
+            bins => counted(bins.len(), "anatomy"),
+        };
+        let cell = |k: usize| {
+            let shares = || curve.bins.iter().map(|bin| &bin.policies[k]);
+            let said = |passed: usize, episodes: usize| format!("{passed}/{episodes}");
+            if numbers {
+                shares().map(|s| said(s.passed, s.episodes)).collect::<Vec<_>>().join(", ")
+            } else {
+                said(shares().map(|s| s.passed).sum(), shares().map(|s| s.episodes).sum())
+            }
+        };
         let cells = (0..names(curve).len()).map(cell);
         [curve.label.clone(), values].into_iter().chain(cells).collect::<Vec<_>>()
     };
-    Section::new("One factor at a time", lead).table(Table::new(head, curves.iter().map(row).collect()))
+    Section::new("One factor at a time", lead)
+        .html(map(&policies, curves))
+        .table(Table::new(head, curves.iter().map(row).collect()))
 }
 
 fn all(r: &RobustnessResult) -> Section {
@@ -102,5 +123,6 @@ fn all(r: &RobustnessResult) -> Section {
             ("why the first did not pass", &|(_, p)| p.why.clone().unwrap_or_default()),
         ],
     );
-    Section::new("All conditions", "").table(table.on_page_only())
+    let episodes = r.rows.iter().flat_map(|row| &row.policies).map(|p| p.episodes).sum();
+    Section::new("All conditions", "").html(page::fold(&counted(episodes, "episode"), &table.html()))
 }
