@@ -192,6 +192,12 @@ impl Cell {
         self.edges.strains(&self.world, 1.0).iter().fold(1.0, |most, s| s.stretch.max(most))
     }
 
+    /// Whether the axis of an instrument's part lies inside an organ, by arm: privileged. Held tissue,
+    /// and tissue that blades shear, does not count.
+    pub fn axes_inside(&self) -> Vec<bool> {
+        self.arms.iter().map(|arm| arm.pierces(&self.world).is_some()).collect()
+    }
+
     /// Wall time since the cell was built.
     pub fn timing(&self) -> Timing {
         self.timing

@@ -5,6 +5,7 @@ use crate::names::SceneChoice;
 use crate::study::{Job, Kind, Study};
 use crate::trials::{Outcomes, Resumed, resumed};
 use clap::Args;
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use trocar_cell::Cell;
 use trocar_core::Progress;
@@ -62,6 +63,15 @@ pub struct RandomActionsRow {
     pub rcm_max_mm: f64,
     /// Largest force on an instrument (N).
     pub force_max_n: f64,
+    /// Way of both tips (m).
+    #[serde(default)]
+    pub path_m: f64,
+    /// Actions after which an instrument's axis was inside an organ, over both arms.
+    #[serde(default)]
+    pub axes_inside: usize,
+    /// How often an instrument's axis came into an organ.
+    #[serde(default)]
+    pub pierced: usize,
     /// How often contact between an instrument and tissue was disabled.
     pub disabled_contacts: usize,
     /// How often contact between holding blades and tissue was disabled.
@@ -81,6 +91,18 @@ pub struct RandomActionsResult {
     pub rows: Vec<RandomActionsRow>,
     /// Actions of all seeds.
     pub actions: usize,
+    /// Disabled contacts, of instruments or blades, and relaxed organs, in 1,000 actions.
+    pub suspensions_per_1000_actions: f64,
+    /// Actions after which an instrument's axis was inside an organ, of all seeds.
+    pub axes_inside: usize,
+    /// How often an instrument's axis came into an organ, in all seeds.
+    pub pierced: usize,
+    /// Largest number of inverted elements in any frame of any seed.
+    pub inverted_peak: usize,
+    /// Seeds that diverged.
+    pub diverged: usize,
+    /// Way of both tips in all seeds (m).
+    pub path_m: f64,
     /// Whether all runs were complete, without divergence, inverted elements or joints beyond their
     /// limits.
     pub unbroken: bool,
@@ -109,9 +131,18 @@ impl Study for RandomActionsExperiment {
         let whole = |r: &RandomActionsRow| {
             r.diverged.is_none() && r.inverted_peak == 0 && r.joint_limits_broken == 0 && r.actions == self.actions
         };
+        let sum = |of: fn(&RandomActionsRow) -> usize| rows.iter().map(of).sum::<usize>();
+        let actions = sum(|r| r.actions);
+        let suspensions = sum(|r| r.disabled_contacts + r.disabled_blades + r.relaxed);
         let result = RandomActionsResult {
             scene: scene.name.clone(),
-            actions: rows.iter().map(|r| r.actions).sum(),
+            actions,
+            suspensions_per_1000_actions: 1e3 * suspensions as f64 / actions.max(1) as f64,
+            axes_inside: sum(|r| r.axes_inside),
+            pierced: sum(|r| r.pierced),
+            inverted_peak: rows.iter().map(|r| r.inverted_peak).max().unwrap_or(0),
+            diverged: sum(|r| usize::from(r.diverged.is_some())),
+            path_m: rows.iter().map(|r| r.path_m).sum(),
             unbroken: rows.iter().all(whole),
             rows,
             resumed,
@@ -144,6 +175,8 @@ fn run(
     let mut policy = RandomActions::default();
     policy.begin(&episode, seed)?;
     let mut row = RandomActionsRow { seed, max_stretch: 1.0, min_volume_ratio: 1.0, ..RandomActionsRow::default() };
+    let tips = |cell: &Cell| -> Vec<DVec3> { cell.observe().iter().map(|arm| arm.tip.translation).collect() };
+    let (mut at, mut inside) = (tips(episode.cell()), episode.cell().axes_inside());
     'episode: while row.actions < actions && episode.end().is_none() {
         for action in policy.act(&episode)? {
             check_interrupted(progress)?;
@@ -151,6 +184,11 @@ fn run(
             row.actions += 1;
             row.max_stretch = row.max_stretch.max(episode.max_stretch());
             row.joint_limits_broken += joint_limits_broken(episode.cell())?;
+            let (now, are_inside) = (tips(episode.cell()), episode.cell().axes_inside());
+            row.path_m += at.iter().zip(&now).map(|(a, b)| a.distance(*b)).sum::<f64>();
+            row.axes_inside += are_inside.iter().filter(|is| **is).count();
+            row.pierced += inside.iter().zip(&are_inside).filter(|(was, is)| !**was && **is).count();
+            (at, inside) = (now, are_inside);
             if step.end.is_some() {
                 break 'episode;
             }
@@ -170,7 +208,7 @@ fn run(
             arm.contact_y_n + arm.constraint_y_n,
             arm.contact_z_n + arm.constraint_z_n,
         ];
-        glam::DVec3::from(sum).length()
+        DVec3::from(sum).length()
     };
     row.force_max_n = episode.rows().iter().flat_map(|c| c.arms().map(force)).fold(0.0, f64::max);
     (row.disabled_contacts, row.disabled_blades, row.relaxed) = (s.disabled_contacts, s.disabled_blades, s.relaxed);
@@ -205,6 +243,10 @@ fn document(r: &RandomActionsResult) -> Document {
         Card::new("Actions", count(r.actions), "of all seeds"),
         Card::new("Seeds without failure", format!("{good} of {}", r.rows.len()), "no divergence, no inverted element")
             .met(good == r.rows.len()),
+        Card::new("Suspensions of physics", fixed(r.suspensions_per_1000_actions, 2), "in 1,000 actions")
+            .met(r.suspensions_per_1000_actions <= 1.0),
+        Card::new("Axes inside organs", count(r.axes_inside), "actions after which one is inside")
+            .met(r.axes_inside == 0),
         Card::new("Joints beyond their limits", count(broken), "over all actions").met(broken == 0),
     ];
     let table = Table::of(
@@ -218,6 +260,9 @@ fn document(r: &RandomActionsResult) -> Document {
             ("Smallest volume", &|row| percent(row.min_volume_ratio, 2)),
             ("RCM (mm)", &|row| fixed(row.rcm_max_mm, 2)),
             ("Force (N)", &|row| fixed(row.force_max_n, 2)),
+            ("Way (m)", &|row| fixed(row.path_m, 2)),
+            ("Actions with an axis inside", &|row| count(row.axes_inside)),
+            ("Pierced", &|row| count(row.pierced)),
             ("Contacts disabled", &|row| count(row.disabled_contacts)),
             ("Contacts of blades disabled", &|row| count(row.disabled_blades)),
             ("Relaxed", &|row| count(row.relaxed)),
