@@ -79,6 +79,23 @@ impl Drive {
         }
     }
 
+    /// The place that the drive moves to next, which its filter delays behind the command; for an
+    /// ideal arm where it is.
+    pub fn reference(&self) -> Setpoint {
+        match self {
+            Self::Dynamic(arm) => arm.setpoint_coordinates().into(),
+            Self::Ideal(drive) => drive.state.at,
+        }
+    }
+
+    /// Stops the reference where it is.
+    pub fn halt(&mut self) {
+        match self {
+            Self::Dynamic(arm) => arm.halt(),
+            Self::Ideal(drive) => (drive.state.to, drive.state.left) = (drive.state.at, 0),
+        }
+    }
+
     /// Advances by a physics step of `dt` (s) under `load` at the tip.
     pub fn step(&mut self, load: impl Fn(&Pose) -> Wrench, dt: f64) -> Result<Moved> {
         match self {

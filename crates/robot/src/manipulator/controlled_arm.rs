@@ -234,6 +234,13 @@ impl Manipulator {
         Ok(())
     }
 
+    /// Stops the reference where it is; a command of coordinates or joints then starts from rest.
+    /// The arm itself comes to rest within its tracking error.
+    pub fn halt(&mut self) {
+        let period = self.period();
+        self.state.reference.halt(period);
+    }
+
     /// Commands only the jaw's opening, clamped to [0, 1].
     ///
     /// # Errors

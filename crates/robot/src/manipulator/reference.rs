@@ -152,6 +152,14 @@ impl Reference {
         self.target = *target;
     }
 
+    /// Stops at the present place, which becomes the target.
+    pub fn halt(&mut self, period: f64) {
+        let (value, still) = (self.value, Joints::zeros(self.q.len()));
+        // Without its rates the controller asks for no torque ahead of the stop.
+        (self.qd, self.qdd) = (still, still);
+        (self.target, self.previous, self.points, self.phase) = (value, value, [value; 3], period);
+    }
+
     pub fn advance(&mut self, context: &ReferenceContext<'_>, dt: f64) {
         let (before, rate) = (*self, self.qd);
         let mut pace = (before.pace + dt / RECOVERY).min(1.0);

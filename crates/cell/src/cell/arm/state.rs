@@ -112,7 +112,7 @@ impl ArmState {
             wanted: Wanted::Setpoint(start, DVec3::ZERO),
             commanded: start,
             held_back: false,
-            guard: ForceGuard::default(),
+            guard: ForceGuard::new(pose.translation),
             guarded: false,
             gripper: Gripper { pose, jaw_angle: start.jaw() * model.blades.max_angle },
             design,

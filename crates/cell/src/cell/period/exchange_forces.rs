@@ -40,7 +40,7 @@ impl ArmUnit {
         }
         self.report_rcm(events);
         let Self { model, state, .. } = self;
-        if let Some(force_n) = state.guard.newly_exceeded(model.force_limit) {
+        if let Some(force_n) = state.guard.newly_exceeded(state.exchange.force().length(), model.force_limit) {
             events.push(CellEvent::ForceLimit { arm: model.side, force_n });
         }
         match self.model.kind {

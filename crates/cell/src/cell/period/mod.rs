@@ -13,6 +13,7 @@ mod cutting;
 mod exchange_forces;
 mod move_arms;
 mod observe;
+mod stop_in_time;
 mod tissue_frame;
 
 use super::Cell;
@@ -52,7 +53,8 @@ impl Cell {
             let tissue = stepper.step_with_loads(model, state, &self.motions, &[]);
             self.end_tissue_frame(start, &tissue, &mut log);
             self.exchange_forces(&mut log)?;
-            self.enforce_tissue_limits(tissue.min_volume_ratio, &mut log);
+            let strains = self.enforce_tissue_limits(tissue.min_volume_ratio, &mut log);
+            self.stop_in_time(&strains);
             // The time of whoever watches is not the cell's.
             wall += clock.elapsed();
             watch(self);

@@ -1,18 +1,28 @@
-//! Rule: no command pushes an instrument harder into tissue than the scene's force limit.
+//! Rule: no arm presses an instrument harder into tissue than the scene's force limit, nor strains
+//! tissue to what the other rules would release.
 //!
 //! Controllers of real arms stop where the contact force is beyond a threshold; an FR3's is 20 N
 //! for a tip in the open ("collision behaviour" in Franka's control interface). In tissue a stop is
-//! not enough, because the pressure remains. So the part of a commanded motion against the force
-//! becomes shorter as the force nears the limit; beyond the limit the instrument retracts. The
-//! stiffness seen so far tells how far a step may go, as in [`crate::Jaw`]: a fixed gain would
+//! not enough, because the pressure remains. So the guard does two things:
+//!
+//! - Commands, 30 times a second: the part of a motion against the load becomes shorter as the load
+//!   nears the limit; beyond the limit the instrument retracts. The motion is measured from the
+//!   arm's reference, because commands are up to 20 mm ahead of a fast arm.
+//! - Stops, 60 times a second: an arm that would pass the limit before the next chance to stop it
+//!   stops at once.
+//!
+//! The stiffness seen so far tells how far a step may go, as in [`crate::Jaw`]: a fixed gain would
 //! oscillate on stiff tissue or be slow on soft tissue. The rest of the motion is as commanded.
+//!
+//! The load is the force on the instrument. Where the strain of tissue is nearer to its limit than
+//! the force is to the force limit, the load has that share of the limit.
 
 use glam::DVec3;
 
-/// Share of the remaining force that one step uses.
+/// Share of the remaining load that one step uses.
 const GAIN: f64 = 0.3;
 
-/// The guard acts from this share of the limit on.
+/// The guard shortens commands from this share of the limit on.
 const FROM_SHARE: f64 = 0.5;
 
 /// Within this share of the limit the instrument stands still.
@@ -21,8 +31,8 @@ const DEADBAND: f64 = 0.02;
 /// Minimum and maximum assumed stiffness of tissue (N/m).
 const STIFFNESS: [f64; 2] = [2e3, 5e4];
 
-/// Decay of the stiffness from one period to the next.
-const FORGETTING: f64 = 0.98;
+/// Decay of the stiffness from one tissue frame to the next.
+const FORGETTING: f64 = 0.99;
 
 /// Minimum motion for a secant (m).
 const LEAST_MOTION: f64 = 2e-5;
@@ -30,38 +40,56 @@ const LEAST_MOTION: f64 = 2e-5;
 /// Maximum retraction (m per period).
 const RETREAT: f64 = 1e-3;
 
+/// Tissue frames that an arm goes on at its speed before a stop has its effect: one until the next
+/// chance to stop it, and one for its tracking error.
+const STOPPING_FRAMES: f64 = 2.0;
+
 /// The force guard of one arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ForceGuard {
     /// Stiffness seen so far (N/m).
     stiffness: f64,
-    /// Force (N) and tip position (m) a period ago.
+    /// Load (N) and tip position (m) at the end of the last frame.
     last: [DVec3; 2],
+    /// Motion of the tip in the last frame (m).
+    motion: DVec3,
     /// Whether the force is beyond the limit and that was reported.
     reported: bool,
 }
 
 impl ForceGuard {
-    /// Begins a period with the tip at `at` (m) under `force` (N).
-    pub fn begin_period(&mut self, force: DVec3, at: DVec3) {
-        let [was, there] = self.last;
-        let (change, way) = (force - was, at - there);
-        self.stiffness *= FORGETTING;
-        if way.length() > LEAST_MOTION && force.length() > 0.0 {
-            self.stiffness = self.stiffness.max(-change.dot(way) / way.length_squared());
-        }
-        self.last = [force, at];
+    /// At rest with the tip at `at` (m), without load.
+    pub fn new(at: DVec3) -> Self {
+        Self { last: [DVec3::ZERO, at], ..Self::default() }
     }
 
-    /// The allowed part of a motion (m) that is commanded for the next period, so that the force
-    /// stays below `limit` (N); the same motion if it is allowed whole.
+    /// Ends a tissue frame with the tip at `at` (m) under `force` (N), where the strain of the
+    /// tissue at the instrument has the share `strain` of its limit.
+    pub fn end_frame(&mut self, force: DVec3, strain: f64, at: DVec3, limit: f64) {
+        let load = if limit.is_finite() && strain * limit > force.length() {
+            strain * limit * force.normalize_or_zero()
+        } else {
+            force
+        };
+        let [was, there] = self.last;
+        let (change, way) = (load - was, at - there);
+        self.stiffness *= FORGETTING;
+        if way.length() > LEAST_MOTION && load.length() > 0.0 {
+            self.stiffness = self.stiffness.max(-change.dot(way) / way.length_squared());
+        }
+        (self.last, self.motion) = ([load, at], way);
+    }
+
+    /// The allowed part of a motion (m) that is commanded for the next period, so that the load
+    /// stays below `limit` (N); the same motion if it is allowed whole. `way` begins at the arm's
+    /// reference.
     pub fn allow(&self, way: DVec3, limit: f64) -> DVec3 {
-        let [force, _] = self.last;
-        let size = force.length();
+        let [load, _] = self.last;
+        let size = load.length();
         if size <= FROM_SHARE * limit {
             return way;
         }
-        let out = force / size;
+        let out = load / size;
         let room = if (limit - size).abs() < DEADBAND * limit { 0.0 } else { limit - size };
         let most = GAIN * room / self.stiffness.clamp(STIFFNESS[0], STIFFNESS[1]);
         let against = -way.dot(out);
@@ -70,20 +98,28 @@ impl ForceGuard {
         if allowed == against { way } else { way + (against - allowed) * out }
     }
 
-    /// Whether the force has just gone beyond `limit` (N).
-    pub fn newly_exceeded(&mut self, limit: f64) -> Option<f64> {
-        let size = self.last[0].length();
+    /// Whether the arm has to stop at once, because it goes against a load that would otherwise
+    /// pass `limit` (N).
+    pub fn must_stop(&self, limit: f64) -> bool {
+        let [load, _] = self.last;
+        let against = -self.motion.dot(load.normalize_or_zero());
+        let ahead = self.stiffness.max(STIFFNESS[0]) * STOPPING_FRAMES * against;
+        against > LEAST_MOTION && load.length() + ahead > limit
+    }
+
+    /// Whether the `force` (N) has just gone beyond `limit` (N).
+    pub fn newly_exceeded(&mut self, force: f64, limit: f64) -> Option<f64> {
         // Reported once, until the force is well below the limit.
-        let over = size > if self.reported { 0.8 * limit } else { limit };
+        let over = force > if self.reported { 0.8 * limit } else { limit };
         let new = over && !self.reported;
         self.reported = over;
-        new.then_some(size)
+        new.then_some(force)
     }
 
     /// Every number of its state.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
-        let Self { stiffness, last, reported } = *self;
-        let vectors = last.map(|v| v.to_array());
+        let Self { stiffness, last: [load, at], motion, reported } = *self;
+        let vectors = [load, at, motion].map(|v| v.to_array());
         vectors.into_iter().flatten().chain([stiffness, f64::from(u8::from(reported))])
     }
 }
@@ -99,7 +135,10 @@ mod tests {
         let mut forces = Vec::new();
         for _ in 0..300 {
             let force = stiffness * (-tip).max(0.0);
-            guard.begin_period(force * DVec3::X, tip * DVec3::X);
+            guard.end_frame(force * DVec3::X, 0.0, tip * DVec3::X, limit);
+            if guard.must_stop(limit) {
+                command = tip;
+            }
             command += guard.allow(DVec3::new(-speed, 0.001, 0.0), limit).x;
             tip += 0.8 * (command - tip);
             forces.push(force);
@@ -124,15 +163,15 @@ mod tests {
     #[test]
     fn what_goes_aside_or_away_is_let_go() {
         let mut guard = ForceGuard::default();
-        guard.begin_period(9.5 * DVec3::Z, DVec3::ZERO);
+        guard.end_frame(9.5 * DVec3::Z, 0.0, DVec3::ZERO, 10.0);
         for way in [1e-3 * DVec3::X, 2e-3 * DVec3::Z] {
             assert_eq!(guard.allow(way, 10.0), way);
         }
         let slanted = guard.allow(DVec3::new(1e-3, 0.0, -1e-3), 10.0);
         assert!(slanted.x == 1e-3 && slanted.z > -1e-4 && slanted.z < 0.0, "{slanted}");
         assert_eq!(guard.allow(-1e-3 * DVec3::Z, 100.0), -1e-3 * DVec3::Z);
-        guard.begin_period(30.0 * DVec3::Z, DVec3::ZERO);
+        guard.end_frame(30.0 * DVec3::Z, 0.0, DVec3::ZERO, 10.0);
         assert!(guard.allow(-1e-3 * DVec3::Z, 10.0).z > 0.0, "it draws back");
-        assert_eq!((guard.newly_exceeded(10.0), guard.newly_exceeded(10.0)), (Some(30.0), None));
+        assert_eq!((guard.newly_exceeded(30.0, 10.0), guard.newly_exceeded(30.0, 10.0)), (Some(30.0), None));
     }
 }

@@ -12,6 +12,8 @@
 
 use super::scope::Scope;
 use super::strain::{MAX_LATCHED_STRETCH, MAX_WAIT_FRAMES};
+use crate::cell::arm::ArmUnit;
+use glam::DVec3;
 
 /// Largest distance of an instrument from the most strained tissue at which it is the cause (m).
 const NEAR: f64 = 0.03;
@@ -20,10 +22,14 @@ const NEAR: f64 = 0.03;
 /// that holds, then the nearest.
 pub(super) fn instrument_at(scope: &Scope<'_>, organ: usize) -> Option<usize> {
     let at = scope.strains[organ].at;
-    let felt = scope.arms.iter().enumerate().filter(|(_, s)| !s.state.contact_disabled && s.meets_tissue());
-    let near = felt.filter(|(_, s)| s.distance(at) < NEAR || s.holds(organ));
+    let near = scope.arms.iter().enumerate().filter(|(_, s)| is_at(s, at, organ));
     let ranked = near.map(|(k, s)| (k, (s.holds(organ), s.distance(at))));
     ranked.min_by(|(_, a), (_, b)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))).map(|(k, _)| k)
+}
+
+/// Whether the instrument of `arm` may be the cause of a strain of `organ` at `place` (m).
+pub(super) fn is_at(arm: &ArmUnit, place: DVec3, organ: usize) -> bool {
+    !arm.state.contact_disabled && arm.meets_tissue() && (arm.distance(place) < NEAR || arm.holds(organ))
 }
 
 /// Disables contact of arm `k` if it strains `organ` too much. Tissue that was just released has

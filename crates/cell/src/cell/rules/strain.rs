@@ -9,6 +9,11 @@ pub(super) const MAX_STRETCH: f64 = 5.0;
 /// Stretch at which latched jaws release at once: at ten the solver reports divergence.
 pub(super) const MAX_LATCHED_STRETCH: f64 = 6.5;
 
+/// Stretch of an edge and share of its rest volume of an element at which the force guard stops an
+/// arm: nearer to rest than [`MAX_STRETCH`] and [`MIN_VOLUME_SHARE`].
+const GUARDED_STRETCH: f64 = 4.0;
+const GUARDED_VOLUME_SHARE: f64 = 0.02;
+
 /// Contact is enabled again when every edge is below this stretch.
 const RESTED_STRETCH: f64 = 3.0;
 
@@ -49,6 +54,12 @@ impl Strain {
     /// is limited for the solver.
     pub fn is_beyond(&self, latched: bool) -> bool {
         self.stretch > if latched { MAX_LATCHED_STRETCH } else { MAX_STRETCH } || self.volume < MIN_VOLUME_SHARE
+    }
+
+    /// The share of the force guard's limits that it has: 1 at a stretch of [`GUARDED_STRETCH`] or
+    /// a volume of [`GUARDED_VOLUME_SHARE`]. Squared, because arms come near the limits fast.
+    pub fn guarded(&self) -> f64 {
+        (self.stretch / GUARDED_STRETCH).max(GUARDED_VOLUME_SHARE / self.volume.max(f64::MIN_POSITIVE)).powi(2)
     }
 
     /// Whether the organ has not recovered.
