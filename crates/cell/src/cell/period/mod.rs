@@ -53,8 +53,8 @@ impl Cell {
             let tissue = stepper.step_with_loads(model, state, &self.motions, &[]);
             self.end_tissue_frame(start, &tissue, &mut log);
             self.exchange_forces(&mut log)?;
-            let strains = self.enforce_tissue_limits(tissue.min_volume_ratio, &mut log);
-            self.stop_in_time(&strains);
+            let at_arms = self.enforce_tissue_limits(tissue.min_volume_ratio, &mut log);
+            self.stop_in_time(&at_arms);
             // The time of whoever watches is not the cell's.
             wall += clock.elapsed();
             watch(self);

@@ -2,20 +2,21 @@
 
 use crate::cell::Cell;
 use crate::cell::arm::{ArmUnit, Wanted};
+use crate::cell::rules::TissueAtArm;
 
 impl Cell {
-    /// `strains`: for each arm, the share of its limit that the strain of the tissue at it has.
-    pub(super) fn stop_in_time(&mut self, strains: &[f64]) {
-        for (arm, strain) in self.arms.iter_mut().zip(strains) {
-            arm.stop_in_time(*strain);
+    /// `tissue`: the strain of the tissue at each arm.
+    pub(super) fn stop_in_time(&mut self, tissue: &[TissueAtArm]) {
+        for (arm, tissue) in self.arms.iter_mut().zip(tissue) {
+            arm.stop_in_time(*tissue);
         }
     }
 }
 
 impl ArmUnit {
-    fn stop_in_time(&mut self, strain: f64) {
+    fn stop_in_time(&mut self, tissue: TissueAtArm) {
         let Self { model, drive, state } = self;
-        state.guard.end_frame(state.exchange.force(), strain, state.gripper.pose.translation, model.force_limit);
+        state.guard.end_frame(state.exchange.force(), tissue, state.gripper.pose.translation, model.force_limit);
         // Commands of joints are not guarded.
         if matches!(state.wanted, Wanted::Setpoint(..)) && state.guard.must_stop(model.force_limit) {
             drive.halt();

@@ -2,6 +2,7 @@
 
 use super::scope::Scope;
 use super::strain::SQUEEZED;
+use super::tissue_at_arm::TissueAtArm;
 use super::{overstretch, pierce, reconnect, relax};
 use crate::cell::Cell;
 use crate::cell::arm::ArmUnit;
@@ -9,10 +10,9 @@ use crate::cell::report::PeriodLog;
 
 impl Cell {
     /// Applies the rules on tissue after a frame whose smallest element has the share `least` of
-    /// its rest volume. Returns for each arm the share of the force guard's limit that the strain of
-    /// the tissue at it has.
-    pub(in crate::cell) fn enforce_tissue_limits(&mut self, least: f64, log: &mut PeriodLog) -> Vec<f64> {
-        let (rules, none) = (self.rules, vec![0.0; self.arms.len()]);
+    /// its rest volume. Returns the strain of the tissue at each arm.
+    pub(in crate::cell) fn enforce_tissue_limits(&mut self, least: f64, log: &mut PeriodLog) -> Vec<TissueAtArm> {
+        let (rules, none) = (self.rules, vec![TissueAtArm::default(); self.arms.len()]);
         if !(rules.force_guard || rules.pierce || rules.overstretch || rules.relax) {
             return none;
         }
@@ -37,10 +37,6 @@ impl Cell {
             }
         }
         scope.log.events.append(&mut relaxed);
-        let at = |arm: &ArmUnit| {
-            let organs = strains.iter().enumerate().filter(|(organ, s)| overstretch::is_at(arm, s.at, *organ));
-            organs.map(|(_, s)| s.guarded()).fold(0.0, f64::max)
-        };
-        self.arms.iter().map(at).collect()
+        self.arms.iter().map(|arm| TissueAtArm::of(arm, &strains)).collect()
     }
 }

@@ -17,6 +17,7 @@
 //! The load is the force on the instrument. Where the strain of tissue is nearer to its limit than
 //! the force is to the force limit, the load has that share of the limit.
 
+use super::TissueAtArm;
 use glam::DVec3;
 
 /// Share of the remaining load that one step uses.
@@ -44,6 +45,9 @@ const RETREAT: f64 = 1e-3;
 /// chance to stop it, and one for its tracking error.
 const STOPPING_FRAMES: f64 = 2.0;
 
+/// The same for the strain of tissue, which speeds up where tissue is pressed on something hard.
+const STRAIN_FRAMES: f64 = 3.0;
+
 /// The force guard of one arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ForceGuard {
@@ -53,6 +57,10 @@ pub(crate) struct ForceGuard {
     last: [DVec3; 2],
     /// Motion of the tip in the last frame (m).
     motion: DVec3,
+    /// The tissue at the instrument then.
+    tissue: TissueAtArm,
+    /// Whether tissue soon is beyond the guard's limits if the motion goes on.
+    strained: bool,
     /// Whether the force is beyond the limit and that was reported.
     reported: bool,
 }
@@ -63,9 +71,10 @@ impl ForceGuard {
         Self { last: [DVec3::ZERO, at], ..Self::default() }
     }
 
-    /// Ends a tissue frame with the tip at `at` (m) under `force` (N), where the strain of the
-    /// tissue at the instrument has the share `strain` of its limit.
-    pub fn end_frame(&mut self, force: DVec3, strain: f64, at: DVec3, limit: f64) {
+    /// Ends a tissue frame with the tip at `at` (m) under `force` (N) of `tissue`; `limit` is that of
+    /// the force (N).
+    pub fn end_frame(&mut self, force: DVec3, tissue: TissueAtArm, at: DVec3, limit: f64) {
+        let strain = tissue.share();
         let load = if limit.is_finite() && strain * limit > force.length() {
             strain * limit * force.normalize_or_zero()
         } else {
@@ -77,7 +86,8 @@ impl ForceGuard {
         if way.length() > LEAST_MOTION && load.length() > 0.0 {
             self.stiffness = self.stiffness.max(-change.dot(way) / way.length_squared());
         }
-        (self.last, self.motion) = ([load, at], way);
+        self.strained = tissue.will_exceed(&self.tissue, STRAIN_FRAMES);
+        (self.last, self.motion, self.tissue) = ([load, at], way, tissue);
     }
 
     /// The allowed part of a motion (m) that is commanded for the next period, so that the load
@@ -104,7 +114,7 @@ impl ForceGuard {
         let [load, _] = self.last;
         let against = -self.motion.dot(load.normalize_or_zero());
         let ahead = self.stiffness.max(STIFFNESS[0]) * STOPPING_FRAMES * against;
-        against > LEAST_MOTION && load.length() + ahead > limit
+        limit.is_finite() && against > LEAST_MOTION && (self.strained || load.length() + ahead > limit)
     }
 
     /// Whether the `force` (N) has just gone beyond `limit` (N).
@@ -118,9 +128,10 @@ impl ForceGuard {
 
     /// Every number of its state.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
-        let Self { stiffness, last: [load, at], motion, reported } = *self;
+        let Self { stiffness, last: [load, at], motion, tissue, strained, reported } = *self;
         let vectors = [load, at, motion].map(|v| v.to_array());
-        vectors.into_iter().flatten().chain([stiffness, f64::from(u8::from(reported))])
+        let flags = [strained, reported].map(|flag| f64::from(u8::from(flag)));
+        vectors.into_iter().flatten().chain(tissue.numbers()).chain(flags).chain([stiffness])
     }
 }
 
@@ -135,7 +146,7 @@ mod tests {
         let mut forces = Vec::new();
         for _ in 0..300 {
             let force = stiffness * (-tip).max(0.0);
-            guard.end_frame(force * DVec3::X, 0.0, tip * DVec3::X, limit);
+            guard.end_frame(force * DVec3::X, TissueAtArm::default(), tip * DVec3::X, limit);
             if guard.must_stop(limit) {
                 command = tip;
             }
@@ -163,14 +174,14 @@ mod tests {
     #[test]
     fn what_goes_aside_or_away_is_let_go() {
         let mut guard = ForceGuard::default();
-        guard.end_frame(9.5 * DVec3::Z, 0.0, DVec3::ZERO, 10.0);
+        guard.end_frame(9.5 * DVec3::Z, TissueAtArm::default(), DVec3::ZERO, 10.0);
         for way in [1e-3 * DVec3::X, 2e-3 * DVec3::Z] {
             assert_eq!(guard.allow(way, 10.0), way);
         }
         let slanted = guard.allow(DVec3::new(1e-3, 0.0, -1e-3), 10.0);
         assert!(slanted.x == 1e-3 && slanted.z > -1e-4 && slanted.z < 0.0, "{slanted}");
         assert_eq!(guard.allow(-1e-3 * DVec3::Z, 100.0), -1e-3 * DVec3::Z);
-        guard.end_frame(30.0 * DVec3::Z, 0.0, DVec3::ZERO, 10.0);
+        guard.end_frame(30.0 * DVec3::Z, TissueAtArm::default(), DVec3::ZERO, 10.0);
         assert!(guard.allow(-1e-3 * DVec3::Z, 10.0).z > 0.0, "it draws back");
         assert_eq!((guard.newly_exceeded(30.0, 10.0), guard.newly_exceeded(30.0, 10.0)), (Some(30.0), None));
     }

@@ -23,6 +23,8 @@ mod reconnect;
 mod relax;
 mod scope;
 mod strain;
+mod tissue_at_arm;
 
 pub(super) use force_guard::ForceGuard;
 pub(super) use strain::Edges;
+pub(super) use tissue_at_arm::TissueAtArm;

@@ -9,11 +9,6 @@ pub(super) const MAX_STRETCH: f64 = 5.0;
 /// Stretch at which latched jaws release at once: at ten the solver reports divergence.
 pub(super) const MAX_LATCHED_STRETCH: f64 = 6.5;
 
-/// Stretch of an edge and share of its rest volume of an element at which the force guard stops an
-/// arm: nearer to rest than [`MAX_STRETCH`] and [`MIN_VOLUME_SHARE`].
-const GUARDED_STRETCH: f64 = 4.0;
-const GUARDED_VOLUME_SHARE: f64 = 0.02;
-
 /// Contact is enabled again when every edge is below this stretch.
 const RESTED_STRETCH: f64 = 3.0;
 
@@ -23,6 +18,9 @@ pub(super) const MIN_VOLUME_SHARE: f64 = 0.01;
 
 /// Contact is enabled again when every element is above this share of its rest volume.
 const RESTED_VOLUME_SHARE: f64 = 0.05;
+
+/// Volumes are measured if an element is below this share of its rest volume.
+const MEASURED_BELOW: f64 = 0.5;
 
 /// Tissue without an instrument at it is checked if an element is below this share of its rest
 /// volume.
@@ -41,6 +39,8 @@ pub(crate) struct Strain {
     pub volume: f64,
     /// Position of the worse of the two (m).
     pub at: DVec3,
+    /// Centroid of the smallest element (m).
+    pub crushed_at: DVec3,
 }
 
 impl Strain {
@@ -54,12 +54,6 @@ impl Strain {
     /// is limited for the solver.
     pub fn is_beyond(&self, latched: bool) -> bool {
         self.stretch > if latched { MAX_LATCHED_STRETCH } else { MAX_STRETCH } || self.volume < MIN_VOLUME_SHARE
-    }
-
-    /// The share of the force guard's limits that it has: 1 at a stretch of [`GUARDED_STRETCH`] or
-    /// a volume of [`GUARDED_VOLUME_SHARE`]. Squared, because arms come near the limits fast.
-    pub fn guarded(&self) -> f64 {
-        (self.stretch / GUARDED_STRETCH).max(GUARDED_VOLUME_SHARE / self.volume.max(f64::MIN_POSITIVE)).powi(2)
     }
 
     /// Whether the organ has not recovered.
@@ -129,11 +123,15 @@ impl Edges {
                 }
             }
             let [a, b] = which.map(|i| positions[i as usize]);
-            let mut strain = Strain { stretch: most.sqrt(), volume: 1.0, at: 0.5 * (a + b) };
-            if least < RESTED_VOLUME_SHARE {
+            let at = 0.5 * (a + b);
+            let mut strain = Strain { stretch: most.sqrt(), volume: 1.0, at, crushed_at: at };
+            if least < MEASURED_BELOW {
                 let (volume, at) = most_crushed(world, body, positions);
-                strain.volume = volume;
+                (strain.volume, strain.crushed_at) = (volume, at);
                 // The position of the strain that lasts.
+                if volume >= RESTED_VOLUME_SHARE {
+                    return strain;
+                }
                 if strain.stretch < RESTED_STRETCH || strain.stretch < MAX_STRETCH && volume < MIN_VOLUME_SHARE {
                     strain.at = at;
                 }

@@ -55,7 +55,7 @@ fn changes(state: &ArmState, hold: &Hold) -> Vec<(&'static str, ArmState)> {
         ("wanted", changed(&|s| s.wanted = Wanted::Joints(0.25))),
         ("commanded", changed(&|s| s.commanded.0[2] += 1e-9)),
         ("held_back", changed(&|s| s.held_back ^= true)),
-        ("guard", changed(&|s| s.guard.end_frame(DVec3::X, 0.0, DVec3::Y, 10.0))),
+        ("guard", changed(&|s| s.guard.end_frame(DVec3::X, Default::default(), DVec3::Y, 10.0))),
         ("guarded", changed(&|s| s.guarded ^= true)),
         ("gripper", changed(&|s| s.gripper.pose.translation.x += 1e-9)),
         ("jaw angle", changed(&|s| s.gripper.jaw_angle += 1e-9)),

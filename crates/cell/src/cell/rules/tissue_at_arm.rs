@@ -1,0 +1,61 @@
+//! The strain of the tissue at an arm's instrument, as the force guard sees it.
+
+use super::overstretch;
+use super::strain::Strain;
+use crate::cell::arm::ArmUnit;
+
+/// Stretch of an edge and share of its rest volume of an element at which the force guard stops an
+/// arm. The other rules act later.
+const MAX_STRETCH: f64 = 4.0;
+const MIN_VOLUME: f64 = 0.03;
+
+/// The strain of the tissue at one arm's instrument.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::cell) struct TissueAtArm {
+    /// Length of the most stretched edge over that at rest.
+    stretch: f64,
+    /// Smallest volume of an element over that at rest.
+    volume: f64,
+    /// Whether the jaws hold it. Then they crush it, not the arm's motion.
+    held: bool,
+}
+
+impl Default for TissueAtArm {
+    fn default() -> Self {
+        Self { stretch: 1.0, volume: 1.0, held: false }
+    }
+}
+
+impl TissueAtArm {
+    /// That of `arm`, with the strains of all organs.
+    pub fn of(arm: &ArmUnit, strains: &[Strain]) -> Self {
+        let mut worst = Self { held: arm.state.held.is_some(), ..Self::default() };
+        for (organ, strain) in strains.iter().enumerate() {
+            if overstretch::is_at(arm, strain.at, organ) {
+                worst.stretch = worst.stretch.max(strain.stretch);
+            }
+            if overstretch::is_at(arm, strain.crushed_at, organ) {
+                worst.volume = worst.volume.min(strain.volume);
+            }
+        }
+        worst
+    }
+
+    /// The share of its limit that it has. Squared, because arms come near the limits fast.
+    pub fn share(&self) -> f64 {
+        let crushed = if self.held { 0.0 } else { MIN_VOLUME / self.volume.max(f64::MIN_POSITIVE) };
+        (self.stretch / MAX_STRETCH).max(crushed).powi(2)
+    }
+
+    /// Whether it is beyond a limit in `frames` frames if it goes on as since `last`, a frame ago.
+    pub fn will_exceed(&self, last: &Self, frames: f64) -> bool {
+        self.stretch + frames * (self.stretch - last.stretch) > MAX_STRETCH
+            || self.volume + frames * (self.volume - last.volume) < MIN_VOLUME
+    }
+
+    /// Its numbers.
+    pub fn numbers(&self) -> [f64; 3] {
+        let Self { stretch, volume, held } = *self;
+        [stretch, volume, f64::from(u8::from(held))]
+    }
+}
