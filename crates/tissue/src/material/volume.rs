@@ -5,7 +5,7 @@ use glam::DMat3;
 
 /// Volume ratio below which the barrier acts, and its strength over the material's volume modulus.
 const BARRIER_BEGINS: f64 = 0.2;
-const BARRIER_STRENGTH: f64 = 0.1;
+const BARRIER_STRENGTH: f64 = 1.0;
 
 /// modulus/2 (J - alpha)^2, and below a fifth of the rest volume a barrier strength/2 ln(J/0.2)^2:
 /// the quadratic is finite for flat elements, and an element between a rigid grasp and pinned
