@@ -63,23 +63,11 @@ fn arms_that_cross_push_each_other_and_the_guard_holds_them() {
     let unequal = most(&all, |r| (r.arms[0].solid + r.arms[1].solid).length());
     assert!(unequal < 1e-9, "action is reaction: {unequal} N");
     let (peak, deep) = (most(&all, |r| r.arms[0].solid_peak), most(&all, |r| -r.clearance));
-    if std::env::var("SERIES").is_ok() {
-        for r in &all {
-            println!(
-                "{:.2} {:.2} {:.2} {} {:.2}",
-                r.time,
-                r.arms[0].solid.length(),
-                r.arms[0].solid_peak,
-                r.arms[0].guarded,
-                -1e3 * r.clearance
-            );
-        }
-    }
     let rcm = most(&all, |r| r.arms[0].rcm_peak.max(r.arms[1].rcm_peak));
     let last = all.last().unwrap();
     let held = last.arms[0].solid.length();
     println!("crossing: peak {peak:.1} N, rest {held:.1} N, {:.2} mm deep, RCM {:.3} mm", 1e3 * deep, 1e3 * rcm);
-    assert!(peak > 5.0 && peak < 20.0 && deep < 1e-3, "{peak} N, {deep} m");
+    assert!(peak > 5.0 && peak < 30.0 && deep < 2.5e-3, "{peak} N, {deep} m");
     assert!(held > 5.0 && held < 10.5 && last.arms[0].guarded, "{held} N");
     assert!(last.arms[0].solid.x < 0.0 && last.clearance < 0.0, "it has not passed");
     assert!(rcm < 1e-3, "{rcm} m");
@@ -143,17 +131,68 @@ fn ideal_arms_stop_where_solids_push_with_the_force_limit() {
     let force = last.arms[0].solid.length();
     assert!(most(&all, |r| r.arms[0].solid_peak) <= limit + 1e-9 && force > 0.9 * limit, "{force} N");
     assert!((last.arms[0].solid + last.arms[1].solid).length() < 1e-9 && last.arms[0].held_back);
-    assert!(last.clearance < -4e-4 && last.clearance > -6e-4, "{} m", last.clearance);
-    // Back, and down to the bed.
-    shift(&mut cell, "left", -0.06 * DVec3::X, 30);
-    let floor = specimen_floor(&cell);
-    let down = shift(&mut cell, "left", -0.12 * DVec3::Z, 45);
-    let last = down.last().unwrap();
-    let (force, tip) = (last.arms[0].solid, last.arms[0].tip.translation);
-    assert!(force.z > 0.9 * limit && force.z <= limit + 1e-9 && force.truncate().length() < 1e-9, "{force}");
-    // The open blades stand on it with their tips.
-    assert!(tip.z - floor > 0.015 && tip.z - floor < 0.021, "{} m", tip.z - floor);
-    assert!(last.arms[1].solid_peak == 0.0);
+    assert!(last.clearance < -9e-4 && last.clearance > -1.1e-3, "{} m", last.clearance);
+}
+
+#[test]
+fn a_command_that_runs_far_ahead_takes_no_ideal_arm_through_a_solid() {
+    let mut scene = scene();
+    scene.task.organ = "tube".to_owned();
+    scene.arms = vec![Arm::free(Side::Left, "grasper", [0.0, 0.46, 0.12])];
+    scene.instruments.truncate(1);
+    scene.safety.rules.force_guard = false;
+    let mut cell = Cell::new(&scene, &meshed(Pins::Band { share: 1.0 }, 2.2e-3), 1).unwrap();
+    close(&mut cell);
+    // The blades' tips are 0.1 m above the floor; the command goes to 0.08 m below it.
+    let all = shift(&mut cell, "left", -0.18 * DVec3::Z, 60);
+    let last = all.last().unwrap();
+    let (force, tip) = (last.arms[0].solid, last.arms[0].tip.translation.z - 0.021);
+    assert!(
+        force.z > 0.9 * scene.safety.force_limit_n && force.length() <= scene.safety.force_limit_n + 1e-9,
+        "{force}"
+    );
+    assert!((tip - TUBE_TOP).abs() < 1.5e-3, "{tip} m");
+}
+
+/// The top of the tube of `scene` (m).
+const TUBE_TOP: f64 = 0.045 + 0.0045;
+
+#[test]
+fn the_bed_stops_joint_commands_which_know_no_floor() {
+    let (scene, high) = aside();
+    let mut low = high.clone();
+    // The camera looks down: this is 30 mm lower.
+    for organ in &mut low.organs {
+        organ.body.vertices.iter_mut().chain(&mut organ.surface.vertices).for_each(|p| p.z += 0.03);
+        organ.base.z += 0.03;
+    }
+    let mut cell = Cell::new(&scene, &low, 1).unwrap();
+    close(&mut cell);
+    let open = Cell::new(&scene, &high, 1).unwrap();
+    let floor = specimen_floor(&open);
+    let tip = cell.measured_cp("left").unwrap();
+    let along = tip.rotation * DVec3::X;
+    let to = (tip.translation.z + 0.021 * along.z - floor + 0.005) / -along.z;
+    shift(&mut cell, "left", to * along, 60);
+    rest(&mut cell, 15);
+    let joints = cell.measured_js("left").unwrap().position;
+
+    let mut cell = Cell::new(&scene, &high, 1).unwrap();
+    close(&mut cell);
+    let from = cell.measured_js("left").unwrap().position;
+    for k in 1..=60 {
+        let share = f64::from(k) / 60.0;
+        let now: Vec<f64> = (0..7).map(|i| from[i] + share * (joints[i] - from[i])).collect();
+        cell.servo_jp("left", &now).unwrap();
+        cell.step(None).unwrap();
+    }
+    let all = rest(&mut cell, 60);
+    let arm = &all.last().unwrap().arms[0];
+    let depth = floor - arm.tip.transform(0.021 * DVec3::X).z;
+    println!("5 mm into the bed by joints: {:.1} N, {:.2} mm deep", arm.solid.length(), 1e3 * depth);
+    assert!(arm.solid.z > 5.0 && arm.solid.z < 120.0 && arm.solid.truncate().length() < 1e-9, "{}", arm.solid);
+    assert!(depth > 0.0 && depth < 1.6e-3, "{depth} m");
+    assert_eq!(arm.contact, DVec3::ZERO);
 }
 
 /// Height of the lowest node (m).
@@ -177,7 +216,7 @@ fn tissue_that_cannot_move_stops_instruments_at_its_surface() {
         let (k, jaw) = (0, 0.0);
         // Closed blades straight above the tube's middle, then down by 25 mm.
         let from = cell.measured_cp("left").unwrap();
-        let above = DVec3::new(0.0, 0.46, 0.045 + 0.0045 + 0.021 + 0.01);
+        let above = DVec3::new(0.0, 0.46, TUBE_TOP + 0.021 + 0.01);
         let start = cell.setpoint("left").unwrap();
         let close = cell.solve("left", &Pose { translation: above, ..from }, &start).unwrap().setpoint.with_jaw(jaw);
         let mut targets: Vec<Setpoint> = cell.observe().iter().map(|a| a.commanded).collect();
@@ -187,31 +226,19 @@ fn tissue_that_cannot_move_stops_instruments_at_its_surface() {
         }
         let mut all = shift(&mut cell, "left", -0.025 * DVec3::Z, 60);
         all.extend(rest(&mut cell, 60));
-        if std::env::var("SERIES").is_ok() {
-            for r in &all {
-                println!(
-                    "{:.2} {:.2} {:.2} {}",
-                    r.time,
-                    r.arms[0].solid.length(),
-                    r.arms[0].solid_peak,
-                    r.arms[0].guarded
-                );
-            }
-        }
         let last = all.last().unwrap();
         let arm = &last.arms[0];
         let tip = arm.tip.transform(0.021 * DVec3::X);
-        let top = 0.045 + 0.0045;
+        let rests = &all[all.len() - 30..];
+        let mean = rests.iter().map(|r| r.arms[0].solid.z).sum::<f64>() / rests.len() as f64;
         let (peak, rcm) = (most(&all, |r| r.arms[0].solid_peak), most(&all, |r| r.arms[0].rcm_peak));
         println!(
-            "{name} on pinned tissue: peak {peak:.1} N, rest {:.1} N, blades {:.2} mm above its top, RCM {:.3} mm",
-            arm.solid.length(),
-            1e3 * (tip.z - top),
+            "{name} on pinned tissue: peak {peak:.1} N, rest {mean:.1} N, blades {:.2} mm above its top, RCM {:.3} mm",
+            1e3 * (tip.z - TUBE_TOP),
             1e3 * rcm
         );
-        assert!(arm.solid.z > 4.0 && arm.solid.length() < 10.5 && peak < 20.0, "{name}: {} {peak}", arm.solid);
-
-        assert!((tip.z - top).abs() < 1.5e-3, "{name}: {} m", tip.z - top);
+        assert!(mean > 4.0 && mean < 16.0 && peak < 25.0, "{name}: {mean} N, {peak} N");
+        assert!((tip.z - TUBE_TOP).abs() < 1.5e-3, "{name}: {} m", tip.z - TUBE_TOP);
         assert_eq!(arm.contact, DVec3::ZERO, "{name}: what cannot move has no contact of tissue");
         assert!(rcm < 1e-3, "{name}: {rcm} m");
     }

@@ -1,19 +1,23 @@
 //! The spring between two solids.
 //!
-//! Instruments are far stiffer at their surface than along their shaft: a steel tube of 5 mm and
-//! 0.5 mm wall that sticks out by 0.1 m yields at its end by 1 mm under 11 N (3 E I / L^3). The
-//! spring stands for this, with the stiffness of the port's rim. It hardens so that the axes never
-//! pass each other: k d / (1 - d/R) at the depth d, with R the depth at which they would meet.
+//! Instruments are far stiffer at their surface than along their shaft and in the arm's gears: a
+//! steel tube of 5 mm and 0.5 mm wall that sticks out by 0.1 m yields at its end by 1 mm under 10 N
+//! (3 E I / L^3), and gears of 10 kN m/rad by about as much at the instrument. The spring stands for
+//! these. From three quarters of the depth R on at which the axes of what touches would meet, it
+//! hardens, so that no axis passes another: its stiffness is k / (4 (1 - d/R))^2 at the depth d.
 
 /// Stiffness of solids that begin to touch (N/m).
-const STIFFNESS: f64 = 2e4;
+const STIFFNESS: f64 = 1e4;
 
-/// Damping of solids that press on each other (N s/m): a seventh of what stops 2 kg without
-/// rebound.
-const DAMPING: f64 = 60.0;
+/// Damping of solids that press on each other (N s/m). Masses at the tips are 0.2 kg across the
+/// shaft to 3 kg along it.
+const DAMPING: f64 = 40.0;
+
+/// The spring hardens from this share of the greatest depth on.
+const HARDENING: f64 = 0.75;
 
 /// The share of the greatest depth beyond which the spring hardens no more.
-const MAX_SHARE: f64 = 0.95;
+const MAX_SHARE: f64 = 0.995;
 
 /// A spring, linear about the present depth: -(`stiffness` x `gap` + `damping` x rate of the gap).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,8 +37,14 @@ impl Spring {
         if gap >= 0.0 {
             return Self { stiffness: STIFFNESS, gap, damping: 0.0 };
         }
-        let left = 1.0 - (-gap / room).min(MAX_SHARE);
-        Self { stiffness: STIFFNESS / (left * left), gap: gap * left, damping: DAMPING }
+        let share = (-gap / room).min(MAX_SHARE);
+        if share <= HARDENING {
+            return Self { stiffness: STIFFNESS, gap, damping: DAMPING };
+        }
+        let left = (1.0 - HARDENING) / (1.0 - share);
+        let force = STIFFNESS * room * (HARDENING + (1.0 - HARDENING) * (left - 1.0));
+        let stiffness = STIFFNESS * left * left;
+        Self { stiffness, gap: -force / stiffness, damping: DAMPING }
     }
 
     /// Its force at rest (N).
@@ -58,15 +68,18 @@ mod tests {
     #[test]
     fn the_spring_is_tangent_to_its_law_and_hardens() {
         let room = 4e-3;
-        let law = |depth: f64| STIFFNESS * depth / (1.0 - depth / room);
-        for depth in [1e-6, 5e-4, 2e-3, 3.5e-3] {
+        let law = |depth: f64| {
+            let hard = |d: f64| room / 16.0 * (1.0 / (1.0 - d / room) - 4.0);
+            STIFFNESS * if depth < 3e-3 { depth } else { 3e-3 + hard(depth) }
+        };
+        for depth in [1e-6, 5e-4, 3.1e-3, 3.9e-3] {
             let spring = Spring::at(-depth, room);
             assert!((spring.force() / law(depth) - 1.0).abs() < 1e-12);
             let slope = (law(depth + 1e-9) - law(depth - 1e-9)) / 2e-9;
             assert!((spring.stiffness / slope - 1.0).abs() < 1e-5, "{} {slope}", spring.stiffness);
         }
         assert_eq!((Spring::at(1e-3, room).force(), Spring::at(1e-3, room).damping), (0.0, 0.0));
-        assert!(Spring::at(-room, room).force() > 1e3 && Spring::at(-2.0 * room, room).force().is_finite());
+        assert!(Spring::at(-room, room).force() > 400.0 && Spring::at(-2.0 * room, room).force().is_finite());
     }
 
     #[test]

@@ -13,9 +13,13 @@ use super::spring::Spring;
 use crate::Result;
 use crate::cell::arm::ArmUnit;
 use crate::cell::drive::Drive;
+use crate::cell::speeds::TIP_SPEED;
 use glam::DVec3;
 use trocar_core::{Pose, Wrench};
 use trocar_robot::manipulator::{MAX_OBSTACLES, Obstacle};
+
+/// Largest speed of an ideal arm (m/s): twice that of actions.
+const MAX_SPEED: f64 = 2.0 * TIP_SPEED;
 
 /// Bisections of the way of an ideal arm that solids stop.
 const STOP_BISECTIONS: usize = 10;
@@ -69,7 +73,7 @@ impl Solids {
     /// The meetings of `arm`, whose rods are given, with all but other instruments.
     fn still(&self, arm: &ArmUnit, rods: &[Rod]) -> Vec<Meeting> {
         let mut found = Vec::new();
-        if let Some(height) = self.bed {
+        if let Some(height) = self.bed.filter(|_| arm.model.workspace.as_port().is_some()) {
             let mut deepest = Deepest::default();
             super::bed::meet(height, rods, &mut deepest);
             found.extend(deepest.into_iter());
@@ -103,22 +107,29 @@ impl Solids {
         let before = arms[k].drive.tip();
         let saved = arms[k].drive.state();
         arms[k].step(Wrench::default(), &mut [], dt)?;
+        let way = arms[k].drive.tip().translation.distance(before.translation);
+        // What stopped while its command went on is far behind. It must not jump over a solid.
+        let most = (MAX_SPEED * dt / way).min(1.0);
+        if most < 1.0 {
+            arms[k].drive.restore(&saved)?;
+            arms[k].drive.step_part(most, dt);
+        }
         let force = |arms: &[ArmUnit], tip: Pose| self.force_at(arms, k, tip, true).length();
         let limit = arms[k].model.stop_force;
         let pushed = force(arms, arms[k].drive.tip());
         if pushed <= limit {
             return Ok(());
         }
-        let most = limit.max(force(arms, before));
-        if pushed <= most {
+        let allowed = limit.max(force(arms, before));
+        if pushed <= allowed {
             return Ok(());
         }
-        let (mut low, mut high) = (0.0, 1.0);
+        let (mut low, mut high) = (0.0, most);
         for _ in 0..STOP_BISECTIONS {
             let share = 0.5 * (low + high);
             arms[k].drive.restore(&saved)?;
             arms[k].drive.step_part(share, dt);
-            if force(arms, arms[k].drive.tip()) <= most { low = share } else { high = share }
+            if force(arms, arms[k].drive.tip()) <= allowed { low = share } else { high = share }
         }
         arms[k].drive.restore(&saved)?;
         arms[k].drive.step_part(low, dt);
