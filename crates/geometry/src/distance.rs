@@ -236,8 +236,9 @@ fn triangle_solid_angle(triangle: &[DVec3; 3], p: DVec3) -> f64 {
     2.0 * numerator.atan2(denominator)
 }
 
-/// The point of a triangle nearest to `p`, by the Voronoi region that contains `p`.
-fn closest_on_triangle(&[a, b, c]: &[DVec3; 3], p: DVec3) -> DVec3 {
+/// The point of a triangle nearest to `p` (m), by the Voronoi region that contains `p` (Ericson
+/// 2005, "Real-Time Collision Detection", 5.1.5).
+pub fn closest_on_triangle(&[a, b, c]: &[DVec3; 3], p: DVec3) -> DVec3 {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
     if d1 <= 0.0 && d2 <= 0.0 {

@@ -44,7 +44,7 @@ mod tri_mesh;
 pub mod io;
 
 pub use axis::OrganAxis;
-pub use distance::{MeshDistance, SignedDistance};
+pub use distance::{MeshDistance, SignedDistance, closest_on_triangle};
 pub use error::{Error, Result};
 pub use grid::{Grid, sample_distance, sample_everywhere};
 pub use isosurface::isosurface;

@@ -5,9 +5,9 @@ use crate::bench::{
 };
 use crate::experiment::{
     ContactExperiment, ControllerGridExperiment, ConvergenceExperiment, CutForceExperiment, ElementQualityExperiment,
-    GraspDesignsExperiment, IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment,
-    ReconstructionExperiment, RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment,
-    WrenchExperiment,
+    GraspDesignsExperiment, IntegratorsExperiment, PortBudgetExperiment, PortRegraspExperiment,
+    RandomActionsExperiment, ReconstructionExperiment, RobustnessExperiment, RolloutsExperiment, SettlingExperiment,
+    SimilarityExperiment, WrenchExperiment,
 };
 use crate::study::{Entry, Of};
 
@@ -22,6 +22,7 @@ pub static STUDIES: &[&dyn Entry] = &[
     &Of::<ElementQualityExperiment>::NEW,
     &Of::<CutForceExperiment>::NEW,
     &Of::<PortBudgetExperiment>::NEW,
+    &Of::<PortRegraspExperiment>::NEW,
     &Of::<ControllerGridExperiment>::NEW,
     &Of::<WrenchExperiment>::NEW,
     &Of::<RandomActionsExperiment>::NEW,

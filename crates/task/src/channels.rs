@@ -119,6 +119,9 @@ row! {
         blades_disabled,
         /// The force guard shortened the command.
         guarded,
+        /// Largest force of solids on the instrument in a physics step of the period (N): the other
+        /// instrument, the bed, tissue that cannot move.
+        solid_n,
     }
 }
 

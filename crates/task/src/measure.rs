@@ -187,5 +187,6 @@ fn arm_channels(cell: &Cell, k: usize, arm: &ArmObservation, bodies: &[usize]) -
         contact_disabled: flag(contact_disabled),
         blades_disabled: flag(blades_disabled),
         guarded: flag(arm.guarded),
+        solid_n: arm.solid_peak,
     })
 }

@@ -20,11 +20,17 @@ use xxhash_rust::xxh3::Xxh3;
 /// The key of [`ChannelsInfo`] in the file's metadata.
 const KEY: &str = "trocar";
 const FORMAT: &str = "trocar-channels";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
-/// What a column of this version was called in files of version 1. `None` for one that they do not
-/// have, which is read as zeros.
-fn name_in_version_1(name: &str) -> Option<String> {
+/// What a column of this version was called in files of an earlier `version`. `None` for one that
+/// they do not have, which is read as zeros.
+fn name_in(version: u32, name: &str) -> Option<String> {
+    if name.ends_with("_solid_n") {
+        return None;
+    }
+    if version > 1 {
+        return Some(name.to_owned());
+    }
     let new = ["_blades_disabled", "_guarded"];
     let task = ["disabled_contacts", "disabled_blades", "relaxed", "activation_step_mm"];
     if new.iter().any(|end| name.ends_with(end)) || task.contains(&name) {
@@ -226,7 +232,7 @@ fn decode(file: std::fs::File) -> std::result::Result<(ChannelsInfo, Vec<Channel
     let mut sum = vec![Vec::new(); count];
     let measures = stored.info.program().map_err(|e| e.to_string())?.measures;
     for name in Channels::names().into_iter().chain(measures.iter().map(ToString::to_string)) {
-        let name = if stored.version == 1 { name_in_version_1(&name) } else { Some(name) };
+        let name = if stored.version < VERSION { name_in(stored.version, &name) } else { Some(name) };
         let Some(name) = name else {
             table.iter_mut().for_each(|row| row.push(0.0));
             continue;

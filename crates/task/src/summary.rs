@@ -47,6 +47,9 @@ pub struct ArmSummary {
     pub peak_constraint_n: f64,
     /// Peak force with which tissue pushed the blades apart (N).
     pub peak_jaw_n: f64,
+    /// Peak force of solids: the other instrument, the bed, tissue that cannot move (N).
+    #[serde(default)]
+    pub peak_solid_n: f64,
     /// Largest tilt (degrees).
     pub tilt_max_deg: f64,
     /// Periods in which contact of the instrument with tissue was disabled.
@@ -258,6 +261,7 @@ fn arm(name: &str, rows: &[Channels]) -> ArmSummary {
         peak_contact_n: most(ArmChannels::contact_n),
         peak_constraint_n: most(ArmChannels::constraint_n),
         peak_jaw_n: most(|a| a.jaw_force_n),
+        peak_solid_n: most(|a| a.solid_n),
         tilt_max_deg: most(|a| a.tilt_deg),
         contact_disabled: all.iter().filter(|a| a.contact_disabled > 0.0).count(),
         blades_disabled: all.iter().filter(|a| a.blades_disabled > 0.0).count(),

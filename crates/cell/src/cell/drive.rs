@@ -5,7 +5,7 @@ use super::workspace::Workspace;
 use crate::{Error, Result};
 use trocar_core::Pose;
 use trocar_core::Wrench;
-use trocar_robot::manipulator::{JointReadings, Manipulator, ManipulatorState};
+use trocar_robot::manipulator::{JointReadings, Manipulator, ManipulatorState, Obstacle};
 
 /// The drive of an instrument.
 #[derive(Clone, Debug)]
@@ -96,18 +96,26 @@ impl Drive {
         }
     }
 
-    /// Advances by a physics step of `dt` (s) under `load` at the tip.
-    pub fn step(&mut self, load: impl Fn(&Pose) -> Wrench, dt: f64) -> Result<Moved> {
+    /// Advances by a physics step of `dt` (s) under `load` at the tip, among `obstacles` that an
+    /// arm with dynamics presses on. An ideal arm has no load and no obstacles.
+    pub fn step(&mut self, load: impl Fn(&Pose) -> Wrench, obstacles: &mut [Obstacle], dt: f64) -> Result<Moved> {
         match self {
             Self::Dynamic(arm) => {
                 let load = load(&arm.measured_cp());
-                let report = arm.step(load, dt)?;
+                let report = arm.step_among(load, obstacles, dt)?;
                 Ok(Moved { rcm_deviation: report.rcm_deviation, on_time: report.pace >= 1.0 })
             }
             Self::Ideal(drive) => {
-                drive.state.step(dt);
+                drive.state.step(1.0, dt);
                 Ok(Moved { rcm_deviation: 0.0, on_time: true })
             }
+        }
+    }
+
+    /// Moves an ideal arm by `share`, below 1, of what it would move in a physics step of `dt` (s).
+    pub fn step_part(&mut self, share: f64, dt: f64) {
+        if let Self::Ideal(drive) = self {
+            drive.state.step(share, dt);
         }
     }
 
@@ -205,12 +213,18 @@ impl IdealState {
         Self { at, to: at, left: 0, rates: [0.0; 4] }
     }
 
-    /// Moves by an equal part of the remaining way.
-    fn step(&mut self, dt: f64) {
+    /// Moves by `share` of an equal part of the remaining way. A part of a step counts as none, so
+    /// that the rest of the way takes as long as before.
+    fn step(&mut self, share: f64, dt: f64) {
         let before = self.at;
         if self.left > 0 {
-            self.at = if self.left == 1 { self.to } else { before.towards(&self.to, 1.0 / f64::from(self.left)) };
-            self.left -= 1;
+            let whole = if self.left == 1 { self.to } else { before.towards(&self.to, 1.0 / f64::from(self.left)) };
+            if share < 1.0 {
+                self.at = before.towards(&whole, share);
+            } else {
+                self.at = whole;
+                self.left -= 1;
+            }
         }
         self.rates = std::array::from_fn(|k| (self.at.0[k] - before.0[k]) / dt);
     }
@@ -246,7 +260,7 @@ mod tests {
         drive.command(&to).unwrap();
         let mut places = vec![drive.tip().translation];
         for _ in 0..16 {
-            drive.step(|_| Wrench::default(), 1.0 / 480.0).unwrap();
+            drive.step(|_| Wrench::default(), &mut [], 1.0 / 480.0).unwrap();
             places.push(drive.tip().translation);
         }
         assert_eq!(drive.measured().0.0[..4], to.0[..4]);
@@ -254,7 +268,7 @@ mod tests {
         assert!(ways.iter().all(|w| (w - ways[0]).abs() < 1e-12), "evenly: {ways:?}");
         assert!((drive.measured().1[0] - 0.003 * 30.0).abs() < 1e-9);
         let saved = drive.state();
-        drive.step(|_| Wrench::default(), 1.0 / 480.0).unwrap();
+        drive.step(|_| Wrench::default(), &mut [], 1.0 / 480.0).unwrap();
         assert_eq!(drive.measured().1, [0.0; 4], "at rest again");
         drive.restore(&saved).unwrap();
         assert_eq!(drive.state(), saved);

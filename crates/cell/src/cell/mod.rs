@@ -1,13 +1,12 @@
 //! The cell of a scene: tissue, and one or two arms with instruments, stepped by actions.
 //!
 //! A control period (1/30 s) is a number of tissue frames (1/60 s), each of them a number of
-//! physics steps of the arms (1/480 s); [`period`] has its stages. Instruments do not push each
-//! other: their clearance is measured, and an event reports contact.
+//! physics steps of the arms (1/480 s); [`period`] has its stages. Instruments push each other, the
+//! bed and tissue that cannot move ([`solid`]); an event reports where instruments touch.
 
 mod action;
 mod arm;
 mod build;
-mod clearance;
 mod crtk;
 mod delay;
 mod drive;
@@ -26,6 +25,7 @@ mod rules;
 mod setpoint;
 mod settle;
 mod shadow;
+mod solid;
 mod speeds;
 mod state;
 mod workspace;
@@ -49,6 +49,7 @@ use crate::{Error, Result, World};
 use arm::ArmUnit;
 use delay::{Delay, Waiting};
 use rules::Edges;
+use solid::{PinnedSurface, Solids};
 use std::time::Duration;
 use trocar_scene::{SafetyRules, Scene};
 use trocar_specimen::Specimen;
@@ -75,7 +76,7 @@ pub struct Timing {
 pub struct ContactParts {
     /// Organs touch each other.
     pub organs: bool,
-    /// Instruments touch organs.
+    /// Instruments touch organs, tissue that cannot move included.
     pub instruments: bool,
 }
 
@@ -105,9 +106,13 @@ pub struct Cell {
     /// Motions of the tools in the last frame.
     motions: Vec<ToolMotion>,
     edges: Edges,
+    /// What instruments push beside each other.
+    solids: Solids,
+    /// Which contacts there are.
+    contact: ContactParts,
     /// By body: frames for which it has been strained without an instrument at it.
     waits: Vec<u32>,
-    /// Whether the instruments overlap and that was reported.
+    /// Whether the instruments touch and that was reported.
     touch: bool,
     timing: Timing,
 }
@@ -130,6 +135,7 @@ impl Cell {
     pub fn with_contact(scene: &Scene, specimen: &Specimen, threads: usize, contact: ContactParts) -> Result<Self> {
         let (frames, physics_steps) = rates(scene)?;
         let Placed { specimen, mut surroundings, floor } = Placed::new(scene, specimen)?;
+        let bed = surroundings.bed_friction.map(|_| floor);
         let arms = build::arms(scene, floor)?;
         let colliders = arms.iter().flat_map(|s| s.model.blades.colliders(s.model.tools));
         let colliders = colliders.filter(|_| contact.instruments).collect();
@@ -138,9 +144,12 @@ impl Cell {
         }
         let schedule = build::schedule(scene.tissue.schedule);
         let world = World::surrounded(&specimen, &surroundings, colliders, schedule, threads)?;
+        let pinned = PinnedSurface::felt(&world, contact);
         Ok(Self {
             motions: Vec::with_capacity(3 * arms.len()),
             edges: Edges::of(&world),
+            solids: Solids { bed, pinned },
+            contact,
             waits: vec![0; world.model.bodies().len()],
             touch: false,
             world,
@@ -157,11 +166,11 @@ impl Cell {
         })
     }
 
-    /// The gap between the two instruments now (m): negative if they overlap, because they do not
-    /// push each other.
+    /// The gap between the two instruments now (m): negative where they press on each other, by as
+    /// much as they yield.
     pub fn clearance(&self) -> f64 {
         match &self.arms[..] {
-            [one, other] => clearance::clearance(&one.rods(), &other.rods()),
+            [one, other] => solid::clearance(&one.rods(), &other.rods()),
             _ => f64::INFINITY,
         }
     }

@@ -59,6 +59,11 @@ pub struct ArmObservation {
     pub contact: DVec3,
     /// Constraint force of a latched grasp (N).
     pub constraint: DVec3,
+    /// Force of solids (N) at the end of the period, mean over its last frame of tissue: the other
+    /// instrument, the bed, tissue that cannot move.
+    pub solid: DVec3,
+    /// Largest magnitude of that force in a physics step of the period (N).
+    pub solid_peak: f64,
     /// Force with which tissue pushes the blades apart (N).
     pub jaw_force: f64,
     /// Whether the load of tissue was above the limit of the arm and was cut off there.
@@ -202,16 +207,16 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest, before.
         volume: f64,
     },
-    /// Tissue pushed the instrument with more than the scene's limit; the instrument retracts.
+    /// Tissue and solids pushed the instrument with more than the scene's limit; the instrument retracts.
     ForceLimit {
         /// The arm.
         arm: Side,
         /// The force (N).
         force_n: f64,
     },
-    /// The instruments overlap. Real ones would touch; here they do not push each other.
+    /// The instruments touch, and push each other.
     InstrumentsTouch {
-        /// How deep (mm).
+        /// By how much they yield (mm).
         depth_mm: f64,
     },
     /// The RCM deviation went beyond the scene's threshold.
@@ -266,9 +271,9 @@ impl std::fmt::Display for CellEvent {
                     "the {organ}, stretched {stretch:.1} times and crushed to {volume:.1}%, was relaxed outside of time"
                 )
             }
-            Self::InstrumentsTouch { depth_mm } => write!(f, "the instruments are {depth_mm:.2} mm inside each other"),
+            Self::InstrumentsTouch { depth_mm } => write!(f, "the instruments touch; they yield by {depth_mm:.2} mm"),
             Self::ForceLimit { arm, force_n } => {
-                write!(f, "tissue pushes the {} instrument with {force_n:.1} N, beyond the limit", arm.name())
+                write!(f, "the {} instrument is pushed with {force_n:.1} N, beyond the limit", arm.name())
             }
             Self::RcmThreshold { arm, deviation_mm } => {
                 write!(f, "the {} RCM deviation of {deviation_mm:.2} mm is beyond the threshold", arm.name())
@@ -297,8 +302,8 @@ pub struct CellReport {
     pub time: f64,
     /// The arms, the left one first.
     pub arms: Vec<ArmObservation>,
-    /// Gap between the two instruments at its end (m): negative if they overlap, because they do
-    /// not push each other.
+    /// Gap between the two instruments at its end (m): negative where they press on each other, by
+    /// as much as they yield.
     pub clearance: f64,
     /// The tissue.
     pub tissue: TissueObservation,

@@ -8,6 +8,7 @@ use super::arm::ArmState;
 use super::delay::Waiting;
 use super::drive::DriveState;
 use super::rules::Edges;
+use super::solid::PinnedSurface;
 use crate::Result;
 use crate::world::WorldState;
 use xxhash_rust::xxh3::Xxh3;
@@ -62,6 +63,8 @@ impl Cell {
             sever: _,
             motions: _,
             edges: _,
+            solids: _,
+            contact: _,
             rules: _,
             timing: _,
         } = self;
@@ -91,6 +94,7 @@ impl Cell {
         if cut {
             // The same number of cuts may be other cuts.
             self.edges = Edges::of(&self.world);
+            self.solids.pinned = PinnedSurface::felt(&self.world, self.contact);
         }
         for (arm, (state, drive)) in self.arms.iter_mut().zip(arms) {
             arm.drive.restore(drive)?;

@@ -1,6 +1,7 @@
 //! The controlled arm: commands, and the physics step.
 
 use super::control::{Controller, Memory};
+use super::obstacle::Obstacle;
 use super::reference::{Reference, ReferenceContext, between};
 use super::settings::ControllerSettings;
 use crate::chain::{self, ArmState, CouplingLaw, Drive, InverseOptions, JointSet, Joints, SerialArm};
@@ -260,6 +261,16 @@ impl Manipulator {
     /// A step outside (0, 20] ms, a load that is not finite, or one so large that the result is not
     /// finite. The state is then unchanged.
     pub fn step(&mut self, load: Wrench, dt: f64) -> Result<StepReport> {
+        self.step_among(load, &mut [], dt)
+    }
+
+    /// The same step with solid `obstacles` that the instrument may press on. Their forces are
+    /// written into them.
+    ///
+    /// # Errors
+    /// As [`step`](Self::step); more than [`MAX_OBSTACLES`](super::MAX_OBSTACLES) obstacles, or an
+    /// invalid one. State and obstacles are then unchanged.
+    pub fn step_among(&mut self, load: Wrench, obstacles: &mut [Obstacle], dt: f64) -> Result<StepReport> {
         if !(dt > 0.0 && dt <= MAX_STEP) {
             return Err(Error::invalid("step", format!("is {dt} s; it must be in (0, {MAX_STEP}] s")));
         }
@@ -276,6 +287,8 @@ impl Manipulator {
         let tip = self.instrument.tip(&flange).translation;
         let external = dynamics.frames.jacobian(self.arm.dof(), tip).torque(load.force, load.torque);
         let mut touches = self.touches(&dynamics.frames, &before);
+        let rims = touches.count;
+        self.meet(obstacles, &dynamics.frames, &mut touches, dt)?;
         let count = touches.count;
         let report = self.arm.step(
             &mut next.arm,
@@ -290,11 +303,11 @@ impl Manipulator {
         // External force and torque on the instrument, about the flange's origin.
         let mut outer = [load.force, load.torque + (tip - flange.translation).cross(load.force)];
         let mut rim_force = 0.0;
-        for (c, (point, direction)) in touches.couplings[..count].iter().zip(touches.places) {
+        for (k, (c, (point, direction))) in touches.couplings[..count].iter().zip(touches.places).enumerate() {
             let force = c.force * direction;
             outer[0] += force;
             outer[1] += (point - flange.translation).cross(force);
-            if c.law == CouplingLaw::Push {
+            if k < rims && c.law == CouplingLaw::Push {
                 rim_force += c.force;
             }
         }
@@ -305,6 +318,9 @@ impl Manipulator {
         let opening = self.instrument.jaw.toward(next.jaw[0], next.jaw[2], dt);
         next.jaw = [opening, (opening - next.jaw[0]) / dt, next.jaw[2]];
         self.state = next;
+        for (obstacle, coupling) in obstacles.iter_mut().zip(&touches.couplings[rims..count]) {
+            obstacle.force = coupling.force;
+        }
         let pace = next.reference.pace;
         Ok(StepReport { arm: report, rim_force, rcm_deviation: self.deviation(&frames), pace })
     }

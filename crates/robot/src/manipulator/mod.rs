@@ -5,7 +5,7 @@
 //!   -> reference (limiter, spline, joints)              setpoint_*
 //!   -> controller (links 2% and instrument 5% too light)
 //!   -> torques
-//!   -> arm with payload, rim, load on the tip           measured_*
+//!   -> arm with payload, rim, obstacles, load on tip    measured_*
 //! ```
 //!
 //! Only joint torques within the arm's limits move the arm. Names are those of CRTK (Su et al.
@@ -19,6 +19,7 @@
 mod control;
 mod controlled_arm;
 mod measure;
+mod obstacle;
 mod reference;
 mod restart;
 mod settings;
@@ -26,4 +27,5 @@ mod touch;
 
 pub use controlled_arm::{Commanded, Manipulator, ManipulatorState, StepReport};
 pub use measure::JointReadings;
+pub use obstacle::{MAX_OBSTACLES, Obstacle};
 pub use settings::{ControllerSettings, Gains, Law, ModelError};

@@ -1,4 +1,4 @@
-//! Contacts between shaft and rim, as couplings for the arm's step.
+//! Contacts of the instrument, as couplings for the arm's step: between shaft and rim here.
 
 use super::controlled_arm::Manipulator;
 use crate::chain::{ArmState, Coupling, CouplingLaw, Frames, MAX_COUPLINGS};
@@ -48,7 +48,7 @@ impl Manipulator {
     }
 }
 
-/// Couplings of a shaft with the rim, with their points (m) and directions.
+/// Couplings of an instrument with rim and obstacles, with their points (m) and directions.
 pub(super) struct Touches {
     pub couplings: [Coupling; MAX_COUPLINGS],
     pub places: [(DVec3, DVec3); MAX_COUPLINGS],
@@ -56,7 +56,7 @@ pub(super) struct Touches {
 }
 
 impl Touches {
-    fn add(&mut self, coupling: Coupling, place: (DVec3, DVec3)) {
+    pub fn add(&mut self, coupling: Coupling, place: (DVec3, DVec3)) {
         if self.count < MAX_COUPLINGS {
             (self.couplings[self.count], self.places[self.count]) = (coupling, place);
             self.count += 1;

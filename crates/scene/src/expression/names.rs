@@ -39,7 +39,7 @@ impl Needs {
     }
 }
 
-const ARM: [(&str, Kind); 40] = [
+const ARM: [(&str, Kind); 41] = [
     ("pivot_1_rad", In(Unit::Radian)),
     ("pivot_2_rad", In(Unit::Radian)),
     ("insertion_m", In(Unit::Metre)),
@@ -80,6 +80,7 @@ const ARM: [(&str, Kind); 40] = [
     ("contact_disabled", Flag),
     ("blades_disabled", Flag),
     ("guarded", Flag),
+    ("solid_n", In(Unit::Newton)),
 ];
 
 const TASK: [(&str, Kind, Needs); 27] = [

@@ -106,6 +106,7 @@ fn arms(recording: &Recording) -> String {
             ("Contact (N)", &|a| fixed(a.peak_contact_n, 2)),
             ("Constraint (N)", &|a| fixed(a.peak_constraint_n, 2)),
             ("Jaw (N)", &|a| fixed(a.peak_jaw_n, 2)),
+            ("Solids (N)", &|a| fixed(a.peak_solid_n, 2)),
             ("Tilt (\u{b0})", &|a| fixed(a.tilt_max_deg, 1)),
             ("Periods without contact", &|a| (a.contact_disabled + a.blades_disabled).to_string()),
             ("Commands shortened", &|a| a.guarded.to_string()),

@@ -28,6 +28,8 @@ pub(super) struct ArmModel {
     pub parts: Vec<Collider>,
     /// Limit of the force guard (N).
     pub force_limit: f64,
+    /// Force of solids at which an ideal arm stops (N).
+    pub stop_force: f64,
     /// RCM deviations that are reported (m): the scene's threshold, and the limit at which hardware
     /// stops.
     pub rcm_limits: [f64; 2],

@@ -5,6 +5,7 @@ use crate::bite::Bite;
 use crate::cell::exchange::Exchange;
 use crate::cell::rules::ForceGuard;
 use crate::cell::setpoint::Setpoint;
+use crate::cell::solid::SolidLoad;
 use crate::hold::Hold;
 use crate::severance::Parting;
 use crate::{GraspDesign, Gripper, Jaw, Scissors};
@@ -51,6 +52,8 @@ pub(crate) struct ArmState {
     /// Change of the jaw's opening (1/s).
     pub jaw_rate: f64,
     pub exchange: Exchange,
+    /// The force of solids.
+    pub solid: SolidLoad,
     pub forces: [ToolForce; 3],
     pub scissors: Scissors,
     /// Angle of a cutter's blades (rad) before they began to close through tissue. Such blades
@@ -119,6 +122,7 @@ impl ArmState {
             jaw,
             jaw_rate: 0.0,
             exchange: Exchange::new(pose.translation),
+            solid: SolidLoad::default(),
             forces: [ToolForce::default(); 3],
             scissors,
             shears: None,
@@ -147,6 +151,7 @@ impl ArmState {
             jaw,
             jaw_rate,
             exchange,
+            solid,
             forces,
             scissors,
             shears,
@@ -199,6 +204,7 @@ impl ArmState {
         if *standing > 0 {
             all.push(f64::from(*standing));
         }
+        all.extend(solid.numbers());
         all.extend(bite.iter().flat_map(Bite::numbers));
         all.extend(parting.iter().flat_map(Parting::numbers));
         all

@@ -1,9 +1,9 @@
 //! Queries about an arm's instrument and the tissue near it.
 
 use super::ArmUnit;
-use crate::World;
-use crate::cell::clearance::Rod;
 use crate::cell::inside::first_organ_around;
+use crate::cell::solid::Rod;
+use crate::{Gripper, World};
 use glam::DVec3;
 use trocar_core::Pose;
 use trocar_tissue::Shape;
@@ -26,15 +26,21 @@ impl ArmUnit {
         self.state.held.as_ref().is_some_and(|held| held.organ == organ)
     }
 
-    /// Its capsules at their present places. The radius includes the rest offset, which is the
-    /// blades' thickness.
+    /// Its capsules where they are after the last frame of tissue. The radius includes the rest
+    /// offset, which is the blades' thickness.
     pub fn rods(&self) -> Vec<Rod> {
-        let rods = self.frames().into_iter().flat_map(|(tool, frame)| {
+        self.rods_at(self.state.gripper.pose)
+    }
+
+    /// The same with the tip frame at `pose`.
+    pub fn rods_at(&self, pose: Pose) -> Vec<Rod> {
+        let gripper = Gripper { pose, ..self.state.gripper };
+        let rods = self.frames_of(&gripper).into_iter().enumerate().flat_map(|(number, (tool, frame))| {
             let parts = self.model.parts.iter().filter(move |part| part.tool == tool);
             parts.filter_map(move |part| match part.shape {
                 Shape::Capsule { ends, radius } => {
                     let ends = ends.map(|p| frame.transform(p));
-                    Some(Rod { ends, radius: radius + part.rest_offset })
+                    Some(Rod { ends, radius: radius + part.rest_offset, part: number })
                 }
                 _ => None,
             })
@@ -42,10 +48,10 @@ impl ArmUnit {
         rods.collect()
     }
 
-    /// The instrument's tools and their poses.
-    fn frames(&self) -> [(usize, Pose); 3] {
-        let [one, two] = self.model.tools.sides().map(|(tool, side)| (tool, self.state.gripper.blade(side)));
-        [(self.model.tools.gripper, self.state.gripper.pose), one, two]
+    /// The instrument's tools and their poses, the shaft first.
+    fn frames_of(&self, gripper: &Gripper) -> [(usize, Pose); 3] {
+        let [one, two] = self.model.tools.sides().map(|(tool, side)| (tool, gripper.blade(side)));
+        [(self.model.tools.gripper, gripper.pose), one, two]
     }
 
     /// The organ that a part of the instrument with contact has pierced, except what the jaws hold
@@ -59,7 +65,7 @@ impl ArmUnit {
     pub fn inside_organ(&self, world: &World, count: usize) -> Option<usize> {
         let Self { model, state, .. } = self;
         let spared = state.held.as_ref().map(|held| held.organ);
-        for (tool, frame) in self.frames().into_iter().take(count) {
+        for (tool, frame) in self.frames_of(&state.gripper).into_iter().take(count) {
             let axes = model.parts.iter().filter(|part| part.tool == tool).filter_map(|part| match part.shape {
                 Shape::Capsule { ends, .. } => Some(ends.map(|p| frame.transform(p))),
                 _ => None,

@@ -18,6 +18,7 @@ impl Cell {
         self.waiting.0.push_back(action.cloned());
         for arm in &mut self.arms {
             arm.state.rcm_peak = 0.0;
+            arm.state.solid.begin_period();
         }
         Ok(())
     }

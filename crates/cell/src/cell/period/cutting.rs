@@ -4,6 +4,7 @@ use crate::Result;
 use crate::cell::Cell;
 use crate::cell::arm::{ArmUnit, Sheared};
 use crate::cell::report::CellEvent;
+use crate::cell::solid::PinnedSurface;
 use crate::gripper::JAW_REGION_BEGIN;
 use crate::severance::{Parting, Severance};
 use glam::DVec3;
@@ -64,6 +65,7 @@ impl Cell {
             let volumes = parting.volumes(&self.world);
             let cut = sheared.open.cut_along(organ, length);
             let pieces = self.world.sever_part(&cut, [from - middle, to - middle], &parting.sides())?;
+            self.solids.pinned = PinnedSurface::felt(&self.world, self.contact);
             for (arm, was) in self.arms.iter_mut().zip(was) {
                 if arm.holds(organ) && !pieces.is_empty() {
                     arm.follow_cut(&self.world, &pieces, was);

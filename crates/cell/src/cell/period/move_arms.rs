@@ -1,11 +1,13 @@
 //! Stage 2: the arms get their commands when the control delay is over, and move for a tissue frame,
-//! in physics steps, under the load of the tissue.
+//! in physics steps, under the load of the tissue and among solids.
 
 use crate::cell::Cell;
 use crate::cell::arm::ArmUnit;
 use crate::cell::report::PeriodLog;
 use crate::{FRAME, Result};
 use std::time::Instant;
+use trocar_core::{Pose, Wrench};
+use trocar_robot::manipulator::Obstacle;
 
 impl Cell {
     /// For tissue frame `frame` of the control period.
@@ -16,19 +18,25 @@ impl Cell {
             if frame * self.physics_steps + step == self.delay.step {
                 self.command(log)?;
             }
-            for arm in &mut self.arms {
-                arm.step(dt)?;
-            }
+            self.solids.step(&mut self.arms, dt)?;
         }
+        self.arms.iter_mut().for_each(|arm| arm.state.solid.end_frame(self.physics_steps));
         self.timing.arms += clock.elapsed();
         Ok(())
     }
 }
 
 impl ArmUnit {
-    fn step(&mut self, dt: f64) -> Result<()> {
+    /// A physics step of `dt` (s) under the load of tissue and `pushed`, another instrument's force
+    /// (N) and torque about the tip (N m), among `obstacles`.
+    pub fn step(&mut self, pushed: Wrench, obstacles: &mut [Obstacle], dt: f64) -> Result<()> {
         let Self { drive, state, .. } = self;
-        let moved = drive.step(|tip| state.exchange.load(tip.translation), dt)?;
+        let load = |tip: &Pose| {
+            let tissue = state.exchange.load(tip.translation);
+            // Not added as a zero, which would change the sign of another.
+            if pushed == Wrench::default() { tissue } else { tissue + pushed }
+        };
+        let moved = drive.step(load, obstacles, dt)?;
         state.rcm_peak = state.rcm_peak.max(moved.rcm_deviation);
         state.held_back |= !moved.on_time;
         Ok(())

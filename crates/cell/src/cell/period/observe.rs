@@ -51,6 +51,8 @@ impl ArmUnit {
             force: TaggedForce { kind, wrench: self.tissue_wrench(kind) },
             contact,
             constraint,
+            solid: state.solid.force(),
+            solid_peak: state.solid.peak,
             jaw_force: self.opening_force(),
             load_limited: state.exchange.limited,
             attached: state.held.is_some(),

@@ -16,7 +16,8 @@ impl Cell {
 impl ArmUnit {
     fn stop_in_time(&mut self, tissue: TissueAtArm) {
         let Self { model, drive, state } = self;
-        state.guard.end_frame(state.exchange.force(), tissue, state.gripper.pose.translation, model.force_limit);
+        let force = state.exchange.force() + state.solid.force();
+        state.guard.end_frame(force, tissue, state.gripper.pose.translation, model.force_limit);
         // Commands of joints are not guarded.
         if matches!(state.wanted, Wanted::Setpoint(..)) && state.guard.must_stop(model.force_limit) {
             drive.halt();

@@ -1,18 +1,23 @@
-//! The clearance between two instruments. They do not push each other; a contact is reported.
+//! The convex parts of an instrument, and the clearance between two instruments.
 
 use glam::DVec3;
 use trocar_geometry::nearest_of_segments;
 
 /// A convex part that is all points within `radius` (m) of a segment.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Rod {
+pub(in crate::cell) struct Rod {
     pub ends: [DVec3; 2],
     pub radius: f64,
+    /// The rigid part that it belongs to: 0 for the shaft, 1 and 2 for the blades.
+    pub part: usize,
 }
+
+/// Number of rigid parts of an instrument.
+pub(super) const PARTS: usize = 3;
 
 /// The smallest gap between two instruments' rods (m): negative if they overlap; infinite if one
 /// has none.
-pub(super) fn clearance(one: &[Rod], other: &[Rod]) -> f64 {
+pub(in crate::cell) fn clearance(one: &[Rod], other: &[Rod]) -> f64 {
     let gap = |a: &Rod, b: &Rod| distance(&a.ends, &b.ends) - a.radius - b.radius;
     one.iter().flat_map(|a| other.iter().map(move |b| gap(a, b))).fold(f64::INFINITY, f64::min)
 }
@@ -29,7 +34,7 @@ mod tests {
 
     #[test]
     fn gaps_are_those_of_the_nearest_points() {
-        let rod = |from: [f64; 3], to: [f64; 3], radius| Rod { ends: [from.into(), to.into()], radius };
+        let rod = |from: [f64; 3], to: [f64; 3], radius| Rod { ends: [from.into(), to.into()], radius, part: 0 };
         let along = rod([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 0.1);
         let gap = |other: Rod| clearance(&[along], &[other]);
         let near = |a: f64, b: f64| (a - b).abs() < 1e-12;

@@ -1,0 +1,39 @@
+//! Where an instrument touches a solid, or may within a physics step.
+
+use super::rod::PARTS;
+use glam::DVec3;
+
+/// Gap below which a touch is possible within a step (m): more than instruments move in one.
+pub(super) const REACH: f64 = 2e-3;
+
+/// A place where an instrument touches a solid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Meeting {
+    /// The place (m): midway between the two surfaces.
+    pub point: DVec3,
+    /// Unit vector in which the solid pushes the instrument.
+    pub normal: DVec3,
+    /// Distance of the surfaces (m), negative where they press.
+    pub gap: f64,
+    /// Depth at which the axis of the instrument's part would reach the solid's, or its surface (m).
+    pub room: f64,
+}
+
+/// The deepest meeting of each rigid part of an instrument.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Deepest([Option<Meeting>; PARTS]);
+
+impl Deepest {
+    /// Adds one of `part`, if it is near and deeper than those before.
+    pub fn add(&mut self, part: usize, meeting: Meeting) {
+        let now = &mut self.0[part];
+        if meeting.gap < now.map_or(REACH, |m| m.gap) {
+            *now = Some(meeting);
+        }
+    }
+
+    /// They, by part.
+    pub fn into_iter(self) -> impl Iterator<Item = Meeting> {
+        self.0.into_iter().flatten()
+    }
+}

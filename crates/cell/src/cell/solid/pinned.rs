@@ -1,0 +1,162 @@
+//! Tissue that cannot move: the triangles of organs whose three vertices are pinned.
+//!
+//! The tissue's own step finds contacts of vertices that move. It has none for pinned vertices, so
+//! such a triangle would let an instrument pass. Here it is a solid for the instrument's axis on
+//! its outer side, with no margin: an instrument that lies beside it is not touched. Triangles with
+//! a vertex that moves belong to the tissue's contact, so no force counts twice. What lies at the
+//! rim of the pinned part and not in front of it is left to them as well.
+
+use super::meeting::{Deepest, Meeting, REACH};
+use super::rod::Rod;
+use crate::World;
+use crate::cell::ContactParts;
+use glam::DVec3;
+use trocar_geometry::{closest_on_triangle, nearest_of_segments};
+
+/// Least cosine of the angle between a triangle's normal and the direction in which it pushes.
+const LEAST_COSINE: f64 = 0.5;
+
+/// Most triangles of a leaf.
+const LEAF: usize = 4;
+
+/// The pinned triangles of all organs, in a tree of boxes.
+#[derive(Debug, Default)]
+pub(in crate::cell) struct PinnedSurface {
+    /// Corners (m), counterclockwise seen from outside, in the tree's order.
+    triangles: Vec<[DVec3; 3]>,
+    nodes: Vec<Node>,
+}
+
+/// A box around triangles. Its first child follows it.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    low: DVec3,
+    high: DVec3,
+    /// The triangles of a leaf; empty otherwise.
+    leaf: [usize; 2],
+    /// The node after its last descendant.
+    after: usize,
+}
+
+impl PinnedSurface {
+    /// The pinned triangles of `world` where they are now, which is where they stay; none if
+    /// instruments do not touch organs.
+    pub fn felt(world: &World, contact: ContactParts) -> Self {
+        if !contact.instruments {
+            return Self::default();
+        }
+        let mut triangles = Vec::new();
+        for (k, body) in world.model.bodies().iter().enumerate() {
+            let pinned = body.pinned();
+            if !pinned.contains(&true) {
+                continue;
+            }
+            let (boundary, nodes) = body.rest().boundary();
+            for t in &boundary.triangles {
+                let t = t.map(|i| nodes[i as usize] as usize);
+                if t.iter().all(|i| pinned[*i]) {
+                    triangles.push(t.map(|i| world.state.position(&world.model, k, i)));
+                }
+            }
+        }
+        let mut nodes = Vec::new();
+        build(&mut triangles, 0, &mut nodes);
+        Self { triangles, nodes }
+    }
+
+    /// Adds the meetings of `rods`.
+    pub(super) fn meet(&self, rods: &[Rod], found: &mut Deepest) {
+        for rod in rods {
+            let mut at = 0;
+            while let Some(node) = self.nodes.get(at) {
+                if !near_box(&rod.ends, rod.radius + REACH, node) {
+                    at = node.after;
+                    continue;
+                }
+                for triangle in &self.triangles[node.leaf[0]..node.leaf[1]] {
+                    if let Some(meeting) = meeting(rod, triangle) {
+                        found.add(rod.part, meeting);
+                    }
+                }
+                at += 1;
+            }
+        }
+    }
+}
+
+/// Appends the tree over `triangles`, the first of which is number `first`.
+fn build(triangles: &mut [[DVec3; 3]], first: usize, nodes: &mut Vec<Node>) {
+    if triangles.is_empty() {
+        return;
+    }
+    let corners = triangles.iter().flatten();
+    let (low, high) =
+        corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
+    let (at, count) = (nodes.len(), triangles.len());
+    let leaf = if count <= LEAF { [first, first + count] } else { [first; 2] };
+    nodes.push(Node { low, high, leaf, after: 0 });
+    if count > LEAF {
+        let size = high - low;
+        let axis = (0..3).max_by(|a, b| size[*a].total_cmp(&size[*b])).unwrap_or(0);
+        let middle = |t: &[DVec3; 3]| t.iter().map(|p| p[axis]).sum::<f64>();
+        // Stable: triangles of equal middles keep their order.
+        triangles.sort_by(|a, b| middle(a).total_cmp(&middle(b)));
+        let (left, right) = triangles.split_at_mut(count / 2);
+        build(left, first, nodes);
+        build(right, first + count / 2, nodes);
+    }
+    nodes[at].after = nodes.len();
+}
+
+/// Whether the segment comes into the box grown by `reach` (m) on all sides.
+fn near_box([from, to]: &[DVec3; 2], reach: f64, node: &Node) -> bool {
+    let (low, high, way) = (node.low - reach, node.high + reach, *to - *from);
+    let (mut begin, mut end) = (0.0_f64, 1.0_f64);
+    for a in 0..3 {
+        let (one, two) = ((low[a] - from[a]) / way[a], (high[a] - from[a]) / way[a]);
+        if way[a] == 0.0 {
+            if from[a] < low[a] || from[a] > high[a] {
+                return false;
+            }
+        } else {
+            (begin, end) = (begin.max(one.min(two)), end.min(one.max(two)));
+        }
+    }
+    begin <= end
+}
+
+/// The meeting of a rod with a triangle, if the rod's axis is in front of it.
+fn meeting(rod: &Rod, triangle: &[DVec3; 3]) -> Option<Meeting> {
+    let [a, b, c] = *triangle;
+    let outward = (b - a).cross(c - a).try_normalize()?;
+    let mut best: Option<(f64, DVec3, DVec3)> = None;
+    let mut add = |p: DVec3, q: DVec3| {
+        let distance = p.distance(q);
+        if best.is_none_or(|(least, ..)| distance < least) {
+            best = Some((distance, p, q));
+        }
+    };
+    // The nearest places are at an end of the axis or at an edge of the triangle, unless the axis
+    // goes through it.
+    let heights = rod.ends.map(|p| (p - a).dot(outward));
+    for p in rod.ends {
+        add(p, closest_on_triangle(triangle, p));
+    }
+    for edge in [[a, b], [b, c], [c, a]] {
+        let [s, t] = nearest_of_segments(rod.ends, edge);
+        add(rod.ends[0].lerp(rod.ends[1], s), edge[0].lerp(edge[1], t));
+    }
+    let (distance, p, q) = best?;
+    if heights[0].min(heights[1]) < 0.0 {
+        let through = rod.ends[0].lerp(rod.ends[1], heights[0] / (heights[0] - heights[1]));
+        if heights[0].max(heights[1]) > 0.0 && closest_on_triangle(triangle, through).distance(through) < 1e-12 {
+            return None;
+        }
+    }
+    let normal = (p - q).try_normalize()?;
+    if normal.dot(outward) < LEAST_COSINE {
+        return None;
+    }
+    let gap = distance - rod.radius;
+    Some(Meeting { point: q + 0.5 * gap * normal, normal, gap, room: rod.radius })
+}
