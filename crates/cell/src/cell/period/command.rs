@@ -66,7 +66,7 @@ impl ArmUnit {
         let Wanted::Setpoint(wanted, _) = state.wanted else { return Ok(()) };
         let (paced, far) = space.paced(&state.commanded, &wanted, model.period);
         let (mut next, low) = space.above_floor(&paced);
-        state.guard.begin_period(state.exchange.force() + state.solid.force(), drive.tip().translation);
+        state.guard.begin_period(state.solid.and(state.exchange.force()), drive.tip().translation);
         let from = space.tip(&state.commanded).translation;
         let mut tip = space.tip(&next);
         let way = tip.translation - from;

@@ -36,6 +36,12 @@ impl SolidLoad {
         self.mean
     }
 
+    /// That force and another (N). Without force it is the other to the bit, which a sum with zeros
+    /// is not: it changes the sign of a zero.
+    pub fn and(&self, other: DVec3) -> DVec3 {
+        if self.mean == DVec3::ZERO { other } else { other + self.mean }
+    }
+
     /// Every number of it, none where there is no force: hashes of states in which nothing touches
     /// are those of earlier versions.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
