@@ -67,7 +67,7 @@ impl Study for PortRegraspExperiment {
         job.claim()?;
         let whole = Whole::read(&self.appendix, job.output(), job.progress)?;
         let (scene, specimen) = (whole.scene(Condition::Cell)?, whole.specimen(Condition::Cell));
-        let tasks: Vec<Task> = self.tasks();
+        let tasks: Vec<Task> = tasks(self.at, &self.drag);
         let one = |(lift, rules): &Task, progress: &dyn Progress| -> Result<Regrasp> {
             let mut scene: Scene = scene.clone();
             if !rules {
@@ -83,25 +83,19 @@ impl Study for PortRegraspExperiment {
     }
 }
 
-impl PortRegraspExperiment {
-    fn tasks(&self) -> Vec<Task> {
-        let mut tasks = Vec::new();
-        for rules in [true, false] {
-            for design in DESIGNS {
-                for drag in &self.drag {
-                    let script = Script {
-                        at: self.at,
-                        regrasp: Some(1e-3 * drag),
-                        after: AfterHold::Finish,
-                        ..Script::default()
-                    };
-                    let jaw_force = trocar_cell::JAW_FORCE;
-                    tasks.push((LiftTrial { condition: Condition::Cell, script, design, jaw_force }, rules));
-                }
+/// The runs: every drag (mm) with both captures, with and without rules.
+fn tasks(at: f64, drags: &[f64]) -> Vec<Task> {
+    let mut tasks = Vec::new();
+    for rules in [true, false] {
+        for design in DESIGNS {
+            for drag in drags {
+                let script = Script { at, regrasp: Some(1e-3 * drag), after: AfterHold::Finish, ..Script::default() };
+                let jaw_force = trocar_cell::JAW_FORCE;
+                tasks.push((LiftTrial { condition: Condition::Cell, script, design, jaw_force }, rules));
             }
         }
-        tasks
     }
+    tasks
 }
 
 /// The unique name of a run.
@@ -141,9 +135,7 @@ mod tests {
 
     #[test]
     fn every_drag_is_run_with_both_captures_with_and_without_rules() {
-        let study =
-            PortRegraspExperiment { appendix: AppendixChoice::default(), drag: vec![5.0, 10.0], at: 0.5, threads: 1 };
-        let tasks = study.tasks();
+        let tasks = tasks(0.5, &[5.0, 10.0]);
         let mut keys: Vec<String> = tasks.iter().map(key).collect();
         keys.sort();
         keys.dedup();
