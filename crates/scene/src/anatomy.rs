@@ -262,9 +262,9 @@ pub enum ScheduleName {
 pub enum ToolContactKind {
     /// The vertices of its surface: an instrument that is thinner than triangles are wide can pass
     /// between them.
-    #[default]
     Vertices,
     /// Its vertices, edges and triangles.
+    #[default]
     Surface,
 }
 
@@ -296,7 +296,7 @@ impl Default for Tissue {
         Self {
             schedule: ScheduleName::Fast,
             contact_offset_mm: 1.5,
-            tool_contact: ToolContactKind::Vertices,
+            tool_contact: ToolContactKind::Surface,
             tip_rest_offset_mm: 1.5,
             friction: 0.6,
             // A wall of 1 mm (two layers of 0.5) over the 5 mm of the blades, at a strength of 1
