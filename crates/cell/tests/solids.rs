@@ -46,10 +46,11 @@ fn close(cell: &mut Cell) {
     (0..15).for_each(|_| drop(cell.step(&Action::targets(&targets)).unwrap()));
 }
 
-/// Closes all jaws and moves the left tip by 60 mm at 0.1 m/s, through where the right instrument
-/// is.
+/// Closes all jaws, raises the left tip by 20 mm and moves it by 60 mm at 0.1 m/s, through where the
+/// right shaft is.
 fn cross(cell: &mut Cell) -> Vec<CellReport> {
     close(cell);
+    shift(cell, "left", 0.02 * DVec3::Z, 15);
     shift(cell, "left", 0.06 * DVec3::X, 18)
 }
 
@@ -59,16 +60,17 @@ fn arms_that_cross_push_each_other_and_the_guard_holds_them() {
     let mut cell = Cell::new(&scene, &specimen, 1).unwrap();
     assert!(cell.clearance() > 0.01);
     let mut all = cross(&mut cell);
-    all.extend(rest(&mut cell, 60));
+    all.extend(rest(&mut cell, 120));
     let unequal = most(&all, |r| (r.arms[0].solid + r.arms[1].solid).length());
     assert!(unequal < 1e-9, "action is reaction: {unequal} N");
     let (peak, deep) = (most(&all, |r| r.arms[0].solid_peak), most(&all, |r| -r.clearance));
     let rcm = most(&all, |r| r.arms[0].rcm_peak.max(r.arms[1].rcm_peak));
     let last = all.last().unwrap();
-    let held = last.arms[0].solid.length();
+    let rests = &all[all.len() - 30..];
+    let held = rests.iter().map(|r| r.arms[0].solid.length()).sum::<f64>() / rests.len() as f64;
     println!("crossing: peak {peak:.1} N, rest {held:.1} N, {:.2} mm deep, RCM {:.3} mm", 1e3 * deep, 1e3 * rcm);
     assert!(peak > 5.0 && peak < 30.0 && deep < 2.5e-3, "{peak} N, {deep} m");
-    assert!(held > 5.0 && held < 10.5 && last.arms[0].guarded, "{held} N");
+    assert!(held > 5.0 && held < 13.0 && last.arms[0].guarded, "{held} N");
     assert!(last.arms[0].solid.x < 0.0 && last.clearance < 0.0, "it has not passed");
     assert!(rcm < 1e-3, "{rcm} m");
     let touches = all.iter().flat_map(|r| &r.events).filter(|e| matches!(e, CellEvent::InstrumentsTouch { .. }));
@@ -131,7 +133,7 @@ fn ideal_arms_stop_where_solids_push_with_the_force_limit() {
     let force = last.arms[0].solid.length();
     assert!(most(&all, |r| r.arms[0].solid_peak) <= limit + 1e-9 && force > 0.9 * limit, "{force} N");
     assert!((last.arms[0].solid + last.arms[1].solid).length() < 1e-9 && last.arms[0].held_back);
-    assert!(last.clearance < -9e-4 && last.clearance > -1.1e-3, "{} m", last.clearance);
+    assert!(last.clearance < -4e-4 && last.clearance > -1.1e-3, "{} m", last.clearance);
 }
 
 #[test]

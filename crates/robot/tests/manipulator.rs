@@ -8,7 +8,7 @@ use glam::DVec3;
 use trocar_core::{Pose, Wrench};
 use trocar_robot::chain::Joints;
 use trocar_robot::instrument::Coordinates;
-use trocar_robot::manipulator::{ControllerSettings, Law, Manipulator, ModelError, StepReport};
+use trocar_robot::manipulator::{ControllerSettings, Law, Manipulator, ModelError, Obstacle, StepReport};
 use trocar_robot::wrench::LoadModel;
 
 const DT: f64 = 1.0 / 480.0;
@@ -381,4 +381,65 @@ fn a_step_is_cheap() {
     println!("a step of one manipulator, commands and reference included: {micros:.1} us");
     // The limit is 25 us on an idle machine; this one may be shared.
     assert!(micros < 100.0, "{micros}");
+}
+
+fn wall(m: &Manipulator, height: f64) -> Obstacle {
+    let point = m.measured_cp().translation;
+    let gap = point.z - height;
+    let damping = if gap < 0.0 { 40.0 } else { 0.0 };
+    Obstacle { point, normal: DVec3::Z, gap, stiffness: 1e4, damping, speed: 0.0, force: 0.0 }
+}
+
+#[test]
+fn an_obstacle_holds_the_tip_and_is_felt_at_the_mount() {
+    let mut m = cell(0, ControllerSettings::default());
+    let height = m.measured_cp().translation.z - 1e-3;
+    m.servo_cp(&Coordinates { insertion: 0.104, ..start(0) }).unwrap();
+    let mut met = [wall(&m, height)];
+    for _ in 0..1440 {
+        met = [wall(&m, height)];
+        m.step_among(Wrench::default(), &mut met, DT).unwrap();
+    }
+    let gap = m.measured_cp().translation.z - height;
+    assert!(met[0].force > 2.0 && (met[0].force / (-1e4 * gap) - 1.0).abs() < 0.02, "{met:?} {gap}");
+    assert!(m.rcm_deviation() < 1e-3);
+    let weight = LoadModel::of(m.instrument(), Wrench::default()).reading(m.flange().rotation, m.arm().gravity());
+    let felt = m.flange().rotation * (m.measured_cf().force - weight.force);
+    assert!((felt - met[0].force * DVec3::Z).length() < 0.05, "{felt} {met:?}");
+    // A step without any is the step of before.
+    let mut other = m.clone();
+    m.step(Wrench::default(), DT).unwrap();
+    other.step_among(Wrench::default(), &mut [], DT).unwrap();
+    assert!(m == other);
+    // Illegal ones change nothing.
+    let good = wall(&m, height);
+    for bad in [
+        Obstacle { normal: 2.0 * DVec3::Z, ..good },
+        Obstacle { stiffness: 0.0, ..good },
+        Obstacle { damping: -1.0, ..good },
+        Obstacle { gap: f64::NAN, ..good },
+    ] {
+        assert!(m.step_among(Wrench::default(), &mut [good, bad], DT).is_err() && m == other);
+    }
+    assert!(m.step_among(Wrench::default(), &mut [good; 9], DT).unwrap_err().to_string().contains("maximum is 8"));
+}
+
+#[test]
+fn the_reflected_mass_is_force_over_acceleration() {
+    let m = cell(1, ControllerSettings::default());
+    let (q, tip) = (m.measured_js().position, m.measured_cp().translation);
+    let (arm, rest) = (m.arm(), m.arm().zeros());
+    let mut seen = Vec::new();
+    for direction in [DVec3::X, DVec3::Y, DVec3::Z] {
+        let row = arm.frames(&q).jacobian(7, tip).row(direction);
+        let pushed = Joints::from_fn(7, |i| 3.0 * row[i]);
+        let free = arm.forward_dynamics(&q, &rest, &rest, &[]).unwrap();
+        let under = arm.forward_dynamics(&q, &rest, &pushed, &[]).unwrap();
+        let gained = Joints::from_fn(7, |i| under[i] - free[i]);
+        let mass = m.reflected_mass(tip, direction);
+        assert!((row.dot(&gained) * mass / 3.0 - 1.0).abs() < 1e-9, "{direction}: {mass} kg");
+        seen.push(mass);
+    }
+    println!("reflected masses at the tip along x, y, z: {seen:.2?} kg");
+    assert!(seen.iter().all(|mass| (0.05..20.0).contains(mass)), "{seen:?}");
 }

@@ -21,6 +21,9 @@ use trocar_robot::manipulator::{MAX_OBSTACLES, Obstacle};
 /// Largest speed of an ideal arm (m/s): twice that of actions.
 const MAX_SPEED: f64 = 2.0 * TIP_SPEED;
 
+/// What is not touched yet counts in a step if it would be within this many steps.
+const AHEAD: f64 = 2.0;
+
 /// Bisections of the way of an ideal arm that solids stop.
 const STOP_BISECTIONS: usize = 10;
 
@@ -148,6 +151,7 @@ impl Solids {
                 found.extend(meetings(&rods, &other.rods_at(other.drive.tip())).map(|m| (m, Some(j))));
             }
         }
+        found.retain(|(m, other)| m.gap < 0.0 || m.gap < AHEAD * dt * closing_speed(arms, k, m, *other));
         // Stable: of equal ones the first stay.
         found.sort_by(|a, b| a.0.gap.total_cmp(&b.0.gap));
         found.truncate(MAX_OBSTACLES);
@@ -183,4 +187,13 @@ impl Solids {
         arms[k].state.solid.add(sum);
         Ok(())
     }
+}
+
+/// Speed with which arm `k` comes nearer to what it may meet, arm `other` or the solid world (m/s).
+fn closing_speed(arms: &[ArmUnit], k: usize, meeting: &Meeting, other: Option<usize>) -> f64 {
+    let velocity = |j: usize| {
+        let manipulator = arms[j].drive.manipulator();
+        manipulator.map_or(DVec3::ZERO, |m| m.measured_cv().at(m.measured_cp().translation, meeting.point))
+    };
+    (other.map_or(DVec3::ZERO, velocity) - velocity(k)).dot(meeting.normal)
 }
