@@ -280,7 +280,7 @@ impl ContactSet {
             *first = next;
         }
         self.of_vertices = contacts.len();
-        self.features.find(frame, body, &self.placed, self.reach, x, way, &mut contacts);
+        self.features.find(frame, body, &self.placed, &self.fixed, self.reach, x, way, &mut contacts);
         (self.contacts, self.places) = (contacts, places);
     }
 

@@ -81,13 +81,15 @@ impl FeatureContacts {
     }
 
     /// Appends the contacts of a substep that begins with the vertices at `x`, which go by `way` if
-    /// their velocities stay (m).
+    /// their velocities stay (m). What no contact moves, because all its vertices are `fixed`, has
+    /// none.
     #[expect(clippy::too_many_arguments, reason = "what a substep begins with")]
     pub fn find(
         &mut self,
         frame: &Frame<'_>,
         body: &Body,
         placed: &[Option<Placed>],
+        fixed: &[bool],
         reach: f32,
         x: impl Fn(usize) -> Vec3A,
         way: impl Fn(usize) -> Vec3A,
@@ -111,6 +113,9 @@ impl FeatureContacts {
                 let by = |anchor: &FeatureAnchor| (anchor.collider, anchor.feature).cmp(&(c as u32, feature.key));
                 let known = self.anchors.binary_search_by(by).map(|k| self.anchors[k].stretch);
                 let Feature { key, site } = *feature;
+                if site.shares().all(|(i, _)| fixed[i as usize]) {
+                    continue;
+                }
                 let x = |i: u32| self.x[i as usize];
                 // What pressed slides with the velocity that it has; what comes may not. Only its
                 // plane is that ahead: a site ahead would swing with every velocity.

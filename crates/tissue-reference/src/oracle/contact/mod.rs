@@ -194,13 +194,16 @@ impl<'a> Contacts<'a> {
                 continue;
             }
             let (axis, free) = (ends.map(|p| pose.transform(p)), radius + collider.rest_offset);
-            for edge in &surface.edges {
+            let moves = |nodes: &[usize]| nodes.iter().any(|i| !self.fixed[*i]);
+            for edge in surface.edges.iter().filter(|edge| moves(&edge.0)) {
                 if let Some(stiffness) = features::of_edge(edge, axis, x, self.stiffness) {
                     push(&edge.0, 0, Kind::Segment(axis), free, stiffness);
                 }
             }
             let points = if axis[0] == axis[1] { 1 } else { 2 };
-            for (t, end) in surface.triangles.iter().flat_map(|t| (0..points).map(move |end| (t, end))) {
+            for (t, end) in
+                surface.triangles.iter().filter(|t| moves(&t[..])).flat_map(|t| (0..points).map(move |end| (t, end)))
+            {
                 if let Some(stiffness) = features::of_triangle(*t, axis[end], x, self.stiffness) {
                     push(t, end as u8, Kind::Point(axis[end]), free, stiffness);
                 }
