@@ -1,5 +1,5 @@
-//! Demonstrations: an episode that an operator keeps is an episode file like any other, with what
-//! the operator sent beside it.
+//! Demonstrations: episodes that an operator keeps. Each is an ordinary episode file, with the
+//! operator's input in files beside it.
 
 use crate::error::{Error, Result};
 use crate::hub::{Arrived, Hub};
@@ -13,14 +13,14 @@ use trocar_specimen::StagedFolder;
 use trocar_task::{Column, RESULT_FILE};
 use trocar_workflow::{SURFACES_FILE, SurfaceWatch};
 
-/// What the operator sent, one JSON object a line.
+/// The operator's input: one JSON object per line.
 const INPUT_FILE: &str = "input.jsonl";
-/// Who moved each arm in each period.
+/// Who moved each arm in each control period.
 const ACTORS_FILE: &str = "actors.csv";
-/// Most raw inputs of an episode: ten minutes of two devices at 500 Hz.
+/// The most inputs that an episode keeps: ten minutes of two devices at 500 Hz.
 const MOST_INPUTS: usize = 600_000;
 
-/// A folder of demonstrations, and the raw input of the one that is made.
+/// A folder of demonstrations, and the input of the episode that runs.
 pub(crate) struct Recorder {
     pub folder: PathBuf,
     input: Vec<String>,
@@ -31,12 +31,12 @@ impl Recorder {
         Self { folder: folder.to_owned(), input: Vec::new() }
     }
 
-    /// A new episode begins.
+    /// Forgets the input of the last episode: a new one begins.
     pub fn begin(&mut self) {
         self.input.clear();
     }
 
-    /// Takes what operators sent; `time_s` is the simulated time.
+    /// Takes the input that has arrived; `time_s` is the simulated time (s).
     pub fn take(&mut self, hub: &Hub, time_s: f64) {
         for (arm, arrived) in hub.take_raw() {
             if self.input.len() < MOST_INPUTS {
@@ -45,11 +45,11 @@ impl Recorder {
         }
     }
 
-    /// Writes the live episode of `show`, which stands at its head, into a folder of its own. Returns
-    /// the folder, and whether all stages are passed.
+    /// Writes the live episode of `show` into a new folder. `show` must stand at the newest period.
+    /// Returns the folder, and whether all stages are passed.
     ///
     /// # Errors
-    /// A folder that cannot be written.
+    /// The episode shown is not live; a folder that cannot be written.
     pub fn keep(&self, show: &mut Show) -> Result<(PathBuf, bool)> {
         let Some(live) = &mut show.live else {
             return Err(Error::Source("an episode file is shown; only a live episode can be kept".to_owned()));
@@ -85,13 +85,13 @@ impl Recorder {
     }
 }
 
-/// Who moved an arm in each period, as a number: 0 is the policy, 1 the operator, 2 nobody.
+/// A column of who moved an arm in each control period: 0 is the policy, 1 the operator, 2 nobody.
 fn actor_column(arm: ArmName, actors: &[[Actor; 2]]) -> Column {
     let values = actors.iter().map(|both| f64::from(both[arm as usize] as u8)).collect();
     Column { name: format!("{}_actor", arm.name()), values }
 }
 
-/// A raw input.
+/// An input as JSON. Times are in seconds.
 fn line(arm: ArmName, arrived: &Arrived, time_s: f64, wall_s: f64) -> Value {
     let command = &arrived.command;
     let mut said = json!({

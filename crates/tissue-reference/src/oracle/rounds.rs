@@ -1,12 +1,12 @@
-//! What has no potential (friction, and which features of a surface touch) is held: minimise, find
-//! it again, until the forces of the true law balance.
+//! Friction limits, and the features of a surface that touch, have no potential. They stay fixed
+//! while a round minimises and are found again after it, until the forces of the true law balance.
 
 use super::newton::{Solver, norm};
 use super::potential::Potential;
 use super::solution::{Failure, Solution};
 use glam::DVec3;
 
-/// Greatest number of updates of what is held.
+/// Most rounds of a step.
 const MAX_ROUNDS: usize = 100;
 
 /// Share of the true law's imbalance to which a round minimises.
@@ -25,7 +25,7 @@ pub(super) fn minimise(
     if let Some(contacts) = &mut potential.contacts {
         contacts.hold(x, false);
     }
-    // Limits of the beginning may be far from those of the end: the first round has none.
+    // Limits at the start may be far from those at the end: the first round has none.
     let guess = potential.motion.as_ref().map(|motion| motion.dt());
     let load_steps = solver.move_fixed(potential, fixed, targets, guess.map(|dt| (dt, velocities)), x)?;
     let tolerance = solver.tolerance();
@@ -47,7 +47,7 @@ pub(super) fn minimise(
         if solution.gradient <= tolerance && potential.contacts.as_ref().is_none_or(|c| c.is_sharp()) {
             return Ok(solution);
         }
-        // Held limits need no more precision than they are true.
+        // The held limits are not exact yet, so a more precise minimum gains nothing.
         let next = solver.minimise(potential, fixed, tolerance.max(INNER_SHARE * solution.gradient), x)?;
         solution.iterations += next.iterations;
         solution.projected += next.projected;

@@ -9,11 +9,11 @@ use trocar_core::Pose;
 /// What slides by less than this in a substep (m) sticks.
 const LEAST_SLIP: f32 = 1e-7;
 
-/// What slides by more than this share of a tool's size in a substep is not looked for ahead.
+/// The plane of what slides by more than this share of a tool's size in a substep is not predicted.
 const LONGEST_SLIP: f32 = 0.3;
 
-/// Cosine of the greatest angle by which a plane turns ahead of what slides; beyond it, the place is
-/// another side of the tool.
+/// Cosine of the greatest angle between the predicted plane and the present one. Beyond it, the
+/// predicted point is on another side of the tool.
 const LEAST_TURN_COSINE: f64 = 0.9;
 
 /// Places the colliders of a substep between two shares of the frame; None: the tool has no motion.
@@ -61,8 +61,8 @@ impl Placed {
     /// Normal and point of the plane at the substep's end, in the frame of `body`, of a place that is
     /// at `p` in the tool's frame and is expected `there` ([`Self::beside`]).
     ///
-    /// The plane of where it is now lags behind what slides: on a tool of 3 mm that is dragged at 6
-    /// mm/s it leans by a degree, and pulls by a sixtieth of the normal force.
+    /// The plane of the present point is wrong for what slides: on a tool of 3 mm that is dragged at
+    /// 6 mm/s it is off by one degree, and a sixtieth of the normal force acts along the surface.
     pub fn plane(&self, collider: &Collider, body: &Body, p: DVec3, there: Vec3A) -> (Vec3A, Vec3A) {
         let here = collider.shape.nearest(p);
         let ahead = self.from.transform(body.origin + there.as_dvec3());

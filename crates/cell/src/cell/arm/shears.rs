@@ -1,4 +1,5 @@
-//! The cutter's blades of an arm: when they bite, how far they have cut, and when that is told.
+//! The blades of an arm's cutter: when a cut begins, how far it has come, and when an event reports
+//! it.
 
 use super::ArmUnit;
 use crate::bite::Bite;
@@ -12,7 +13,7 @@ pub(in crate::cell) struct Sheared {
     pub open: Gripper,
     /// The part of the blades along which tissue is cut: distances from the pivot (m).
     pub part: [f64; 2],
-    /// An event tells of the cut.
+    /// An event reports the cut.
     pub told: bool,
     /// The blades open again, or are out of the tissue.
     pub ends: bool,

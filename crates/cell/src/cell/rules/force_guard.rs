@@ -86,7 +86,8 @@ impl ForceGuard {
         if way.length() > LEAST_MOTION && load.length() > 0.0 {
             self.stiffness = self.stiffness.max(-change.dot(way) / way.length_squared());
         }
-        self.strained = tissue.will_exceed(&self.tissue, STRAIN_FRAMES);
+        let against = -way.dot(load.normalize_or_zero());
+        self.strained = tissue.will_exceed(&self.tissue, against, STRAIN_FRAMES);
         (self.last, self.motion, self.tissue) = ([load, at], way, tissue);
     }
 

@@ -9,6 +9,13 @@ use crate::cell::arm::ArmUnit;
 const MAX_STRETCH: f64 = 4.0;
 const MIN_VOLUME: f64 = 0.03;
 
+/// Tissue with an element below this share of its rest volume is squeezed between the instrument
+/// and something hard, which then is nearer than ...
+const SQUEEZED: f64 = 0.4;
+
+/// ... that share of the thickness of an organ (m).
+const THICKNESS: f64 = 0.01;
+
 /// The strain of the tissue at one arm's instrument.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::cell) struct TissueAtArm {
@@ -47,10 +54,12 @@ impl TissueAtArm {
         (self.stretch / MAX_STRETCH).max(crushed).powi(2)
     }
 
-    /// Whether it is beyond a limit in `frames` frames if it goes on as since `last`, a frame ago.
-    pub fn will_exceed(&self, last: &Self, frames: f64) -> bool {
+    /// Whether it is beyond a limit in `frames` frames if it goes on as since `last`, a frame ago,
+    /// or if the instrument goes on against it by `way` (m) a frame.
+    pub fn will_exceed(&self, last: &Self, way: f64, frames: f64) -> bool {
         self.stretch + frames * (self.stretch - last.stretch) > MAX_STRETCH
             || self.volume + frames * (self.volume - last.volume) < MIN_VOLUME
+            || !self.held && self.volume < SQUEEZED && frames * way > THICKNESS * (self.volume - MIN_VOLUME)
     }
 
     /// Its numbers.

@@ -17,8 +17,8 @@ fn spheres(r: &ContactResult) -> Section {
     let lead = format!(
         "A sphere of {} mm is pressed {} mm without friction into a layer of {} mm, {} kPa and Poisson's ratio {}, \
          which is fixed to its ground. The oracle is Newton's method in double precision on the same mesh, with the \
-         same stiffness of contact and the true distance at every place; *stiff* is the oracle with contact 50 times \
-         as stiff. Hertz's force is that of a half-space; that of the layer is Dimitriadis and others' (2002). What \
+         same stiffness of contact and the true distance at every place. Stiff is the oracle with contact 50 times as \
+         stiff. Hertz's force is that of a half-space; that of the layer is Dimitriadis and others' (2002). What \
          separates them from the oracle is the mesh.",
         fixed(r.radius_mm, 0),
         fixed(r.depth_mm, 1),

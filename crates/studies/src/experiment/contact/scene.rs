@@ -1,11 +1,9 @@
 //! The layer of tissue and what presses on it.
 
-use crate::Result;
+use crate::{Result, scenes};
 use glam::DVec3;
 use trocar_geometry::TetMesh;
-use trocar_tissue::{
-    BodyContact, BodyDescription, Collider, ConstitutiveModel, Material, Model, ModelBuilder, Shape, ToolContact,
-};
+use trocar_tissue::{BodyContact, BodyDescription, Collider, Material, Model, ModelBuilder, Shape, ToolContact};
 
 /// The layer's width and thickness (m).
 pub const WIDTH: f64 = 24e-3;
@@ -17,15 +15,12 @@ pub const GAP: f64 = 1.7e-3;
 /// Height of the body above it (m).
 const HEIGHT: f64 = 8e-3;
 
+/// Viscosity over Young's modulus (s).
+const VISCOSITY_TIME: f64 = 4e-3;
+
 /// The tissue. Young's modulus is in Pa.
 pub fn material(young_modulus: f64, poisson_ratio: f64) -> Material {
-    Material {
-        model: ConstitutiveModel::StableNeoHookean,
-        young_modulus,
-        poisson_ratio,
-        density: 1200.0,
-        viscosity: 4e-3 * young_modulus,
-    }
+    Material { viscosity: VISCOSITY_TIME * young_modulus, ..scenes::material(young_modulus, poisson_ratio) }
 }
 
 /// A layer with so many elements over its thickness that is fixed to its ground, and a tool.

@@ -83,10 +83,21 @@ impl CutForceExperiment {
             work_error: worst(&|r| Some(r.work_error)),
             thickness_mm: 1e3 * THICKNESS,
             lever_mm: 1e3 * Blades::default().lever(),
+            compared_rad: compared(Shape::Slab),
             weak,
             rows,
         })
     }
+}
+
+/// The angles between which the force on `shape` is compared with the closed form (rad).
+fn compared(shape: Shape) -> [f64; 2] {
+    [2.0 * (0.5 * THICKNESS / (BEGUN * shape.edge())).atan(), CLOSED]
+}
+
+/// The angle at which the blades meet the near edge of a slab (rad).
+fn meets() -> f64 {
+    2.0 * (0.5 * THICKNESS / Shape::Slab.edge()).atan()
 }
 
 /// Torque on scissors at `angle` (rad) in a sheet of `thickness` (m) and `toughness` (J/m2):
@@ -127,7 +138,8 @@ fn run(shape: Shape, toughness: f64, force: f64) -> Result<(Vec<CutSample>, Opti
             if now < was {
                 let torque_nm = force_n * blades.lever();
                 let middle = 0.5 * (was + now);
-                let closed_form_nm = shape.thickness().map(|t| closed_form(toughness, t, middle));
+                let thickness = shape.thickness().filter(|_| middle <= meets());
+                let closed_form_nm = thickness.map(|t| closed_form(toughness, t, middle));
                 samples.push(CutSample {
                     angle_rad: middle,
                     turned_rad: was - now,
@@ -155,8 +167,8 @@ fn row(shape: Shape, toughness: f64) -> Result<CutRow> {
     let cut = cut.unwrap_or_default();
     // From the force that the jaws felt, and the faces that opened.
     let work_mj = 1e3 * samples.iter().map(|s| s.torque_nm * s.turned_rad).sum::<f64>();
-    let from = 2.0 * (0.5 * THICKNESS / (BEGUN * shape.edge())).atan();
-    let compared = samples.iter().filter(|s| (CLOSED..=from).contains(&s.angle_rad));
+    let [from, to] = compared(shape);
+    let compared = samples.iter().filter(|s| (to..=from).contains(&s.angle_rad));
     let errors = compared.filter_map(|s| s.closed_form_nm.map(|form| (s.torque_nm / form - 1.0).abs()));
     Ok(CutRow {
         shape: shape.name(),
@@ -184,8 +196,7 @@ fn weak() -> Result<WeakScissors> {
         if closed_form(toughness, THICKNESS, middle) > most { low = middle } else { high = middle }
     }
     // The slab begins some way from the pivot.
-    let meets = 2.0 * (0.5 * THICKNESS / Shape::Slab.edge()).atan();
-    let closed_form_rad = high.min(meets);
+    let closed_form_rad = high.min(meets());
     Ok(WeakScissors { force_n, toughness_j_m2: toughness, stands_rad, closed_form_rad, cut: cut.is_some() })
 }
 

@@ -18,15 +18,24 @@ const FORM: [u8; 3] = [128, 128, 128];
 const SHOWN: f64 = 1.1;
 
 pub(super) fn document(r: &CutForceResult) -> Result<Document> {
+    let [from, to] = r.compared_rad;
     let lead = format!(
         "Scissors close through a slab of {} mm and through a tube across them. The force is what the jaws of the \
          cell feel, at the middle of the blades, {} mm from the pivot. The work is the torque integrated over the \
-         angle; the area is that of the faces that opened, projected on the plane of the cut.",
+         angle; the area is that of the faces that opened, projected on the plane of the cut. On slabs the torque is \
+         compared with the closed form from {} rad, where the cut is well in the slab, to {} rad, where blades count \
+         as closed.",
         fixed(r.thickness_mm, 0),
-        fixed(r.lever_mm, 1)
+        fixed(r.lever_mm, 1),
+        fixed(from, 2),
+        fixed(to, 2)
     );
     let section = Section::new("Force of scissors", lead).cards(cards(r)).figures([
-        plot(r, "slab", "<b>Slab</b>: what the jaws felt, and the closed form of Mahvash and Okamura.")?,
+        plot(
+            r,
+            "slab",
+            "<b>Slab</b>: what the jaws felt, and Mahvash and Okamura's closed form once the blades meet it.",
+        )?,
         plot(r, "tube", "<b>Tube</b> of 9 mm.")?,
     ]);
     Ok(Document::new("Force of scissors", "Torque and work of a cut beside the closed form")

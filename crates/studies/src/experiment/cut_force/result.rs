@@ -13,7 +13,7 @@ pub struct CutSample {
     pub force_n: f64,
     /// The torque of that force (N m).
     pub torque_nm: f64,
-    /// The closed form at that angle (N m); none for the tube.
+    /// The closed form at that angle (N m); none for the tube, and none before the blades meet the slab.
     pub closed_form_nm: Option<f64>,
 }
 
@@ -26,8 +26,8 @@ pub struct CutRow {
     pub toughness_j_m2: f64,
     /// Largest force that the jaws felt, at the middle of the blades (N).
     pub force_peak_n: f64,
-    /// Largest difference of the torque from the closed form, over the closed form; none for the
-    /// tube.
+    /// Largest difference of the torque from the closed form within the compared angles, over the
+    /// closed form; none for the tube.
     pub force_error: Option<f64>,
     /// Work of the jaws: torque integrated over angle (mJ).
     pub work_mj: f64,
@@ -71,6 +71,8 @@ pub struct CutForceResult {
     pub thickness_mm: f64,
     /// Distance from the pivot at which forces of the jaws act (mm).
     pub lever_mm: f64,
+    /// Angles between which the torque on slabs is compared with the closed form (rad).
+    pub compared_rad: [f64; 2],
     /// All cuts.
     pub rows: Vec<CutRow>,
     /// Jaws that are too weak.
