@@ -280,10 +280,7 @@ fn close_by(jaws: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 fn jaws_that_a_command_stops_hold_with_what_they_press() {
     let whole = close_by(std::iter::repeat_n(0.0, 30)).unwrap();
     assert!(whole.0 == 0.5 && whole.1 >= 0.475, "all the force: {whole:?}");
-    for o in [0.4, 0.45, 0.5, 0.55, 0.6, 0.7] {
-        println!("{o}: {:?}", close_by(std::iter::repeat_n(o, 30)));
-    }
-    let stopped = close_by(std::iter::repeat_n(0.35, 30)).unwrap();
+    let stopped = close_by(std::iter::repeat_n(0.45, 30)).unwrap();
     assert!(stopped.0 == stopped.1 && (0.05..0.45).contains(&stopped.0), "a part of it: {stopped:?}");
     // On their way they pass that opening, and hold where they end.
     let ramp = (1..=30).map(|k| (1.0 - 0.05 * f64::from(k)).max(0.0));

@@ -8,7 +8,7 @@
 const TOUCH: f64 = 0.002;
 
 /// Share of the opening at the first touch to which the jaws close at first.
-const SHARE: f64 = 0.30;
+const SHARE: f64 = 0.36;
 
 /// Range of that share.
 const SHARES: [f64; 2] = [0.2, 0.5];
@@ -19,7 +19,7 @@ const LEAST_OPENING: f64 = 0.15;
 
 /// A fold of wide tissue is pressed to this multiple of that share: jaws that close further on it
 /// push their tips through the surface beside it.
-const FOLD: f64 = 5.0 / 3.0;
+const FOLD: f64 = 1.4;
 
 /// Force on the blades (N) with which a fold of soft tissue bears its weight. Jaws that feel less
 /// close on until they feel it, in steps of this opening a period. Jaws that stop for 0.1 s take

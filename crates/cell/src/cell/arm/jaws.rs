@@ -55,11 +55,14 @@ impl ArmUnit {
         }
     }
 
-    /// Counts the frames for which jaws that closed on tissue have stood at their commanded opening.
+    /// Counts the frames for which jaws that closed on tissue have stood at their commanded opening,
+    /// or just short of it because they press with their whole force.
     fn count_standing(&mut self, wanted: f64, opening: f64, force: f64) {
         let state = &mut self.state;
+        let at_it = (wanted - opening).abs() < SAME_OPENING;
+        let short_of_it = wanted < opening && force >= PRESSING * state.jaw.budget;
         // Shut blades hold nothing.
-        let stopped = wanted > 0.0 && (wanted - opening).abs() < SAME_OPENING;
+        let stopped = wanted > 0.0 && (at_it || short_of_it);
         let there = state.held.is_none() && stopped && force >= MIN_GRIP;
         state.standing = match state.standing {
             0 => u32::from(there && state.jaw_rate < 0.0),
