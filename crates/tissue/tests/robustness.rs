@@ -7,8 +7,8 @@ use trocar_core::Pose;
 use trocar_geometry::TetMesh;
 use trocar_testing::blocks::{FRAME, GRAVITY, block, model, nodes, tissue};
 use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, Grasp, Material, Model, ModelBuilder, SolverSettings, State, Stepper,
-    ToolMotion,
+    BodyDescription, ConstitutiveModel, Grasp, Material, Model, ModelBuilder, SolverSettings, State, Stepper, Support,
+    SupportField, SupportPlane, ToolMotion,
 };
 
 fn lifted(height: f64) -> Pose {
@@ -157,4 +157,33 @@ fn a_saved_state_goes_on_as_if_nothing_had_happened() {
     let first = go_on(state);
     assert_eq!(first, go_on(saved.clone()));
     assert_ne!(first, saved.hash());
+}
+
+/// A crumb of tissue that nothing holds comes to rest on what supports it, however light it is.
+#[test]
+fn light_bodies_come_to_rest_on_their_supports() {
+    let up = DVec3::new(0.1, 0.0, 1.0).normalize();
+    for edge in [2e-3, 8e-3] {
+        let mesh = block([2, 1, 1], edge);
+        let plane = SupportPlane { point: DVec3::Z * -edge, normal: up, friction: 0.4 };
+        let field = SupportField::under(&mesh, up, 1e-3, 0.4).unwrap();
+        for (name, support) in [("plane", Support::from(plane)), ("field", field.into())] {
+            let mut builder = ModelBuilder::new().gravity(GRAVITY);
+            let material = Material { viscosity: 4.0, ..tissue(12e3) };
+            let (name, supports) = (name.to_owned(), vec![support]);
+            builder.body(BodyDescription { name, mesh: &mesh, material, pinned: vec![], supports }).unwrap();
+            let model = builder.build().unwrap();
+            let mut state = State::new(&model);
+            let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
+            let mut last = 0.0;
+            for _ in 0..60 {
+                let report = stepper.step(&model, &mut state, &[]);
+                assert_eq!((report.inverted, report.divergence), (0, None));
+                // From a height of `edge` it falls at less than this.
+                assert!(report.max_speed < 0.5 && report.min_volume_ratio > 0.9, "{report:?}");
+                last = report.max_speed;
+            }
+            assert!(last < 1e-3, "{} at {edge} m: {last} m/s", model.bodies()[0].name());
+        }
+    }
 }

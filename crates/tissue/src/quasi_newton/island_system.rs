@@ -87,12 +87,6 @@ impl IslandSystem<'_> {
         most > LIMIT_SHARE * largest
     }
 
-    /// Whether something holds each of the bodies. A flying body goes far in a substep without
-    /// being deformed, which sweeps would carry badly.
-    pub fn is_held(&mut self) -> bool {
-        !self.all().any(|body| body.is_free())
-    }
-
     /// Rounding of positions (m).
     pub fn rounding(&mut self) -> f32 {
         2.0 * f32::EPSILON * self.active().map(|body| body.extent()).fold(0.0, f32::max)

@@ -40,7 +40,6 @@ impl IslandSystem<'_> {
         }
         self.active().for_each(|body| body.iterate.base.copy_from_slice(&body.iterate.x[..body.layout.rows]));
         // The minimum lies between a share with a negative slope and one with a positive slope.
-        let held = self.is_held();
         let (mut share, mut below, mut above) = (1.0f32, (0.0f32, slope), None);
         for trial in 0..=MAX_LINE_SEARCH_TRIALS {
             let h = self.h;
@@ -50,7 +49,7 @@ impl IslandSystem<'_> {
             }
             // Steps of squeezed elements' nodes may have been shortened.
             slope = self.slope();
-            if held && below.0 == 0.0 {
+            if below.0 == 0.0 {
                 below.1 = slope;
             }
             self.take_gradient();

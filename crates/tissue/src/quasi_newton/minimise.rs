@@ -37,7 +37,6 @@ impl IslandSystem<'_> {
                 body.update_contacts();
             }
         });
-        let held = self.is_held();
         let mut stepped = behind && self.move_constraints();
         let settings = self.slots[0].solver.settings;
         let (tolerance, at_rest) = self.tolerances();
@@ -77,9 +76,11 @@ impl IslandSystem<'_> {
             match self.search() {
                 Found::Step => stepped = true,
                 Found::Nothing if stepped && !alone && self.wake(absolute, relative) => {}
-                Found::Nothing if stepped && (!held || self.is_solved(wide, wide_relative)) => break,
+                Found::Nothing if stepped && self.is_solved(wide, wide_relative) => break,
                 // Steps of an earlier substep may mislead if contacts have changed.
                 Found::Nothing if self.history.forget() => {}
+                // Sweeps carry bodies that touch and are not held badly: they lose momentum.
+                Found::Nothing if stepped && !alone && self.all().any(|body| body.is_free()) => break,
                 Found::Nothing => {
                     self.all().for_each(|body| body.restore());
                     return false;

@@ -10,10 +10,11 @@ use crate::cell::report::PeriodLog;
 
 impl Cell {
     /// Applies the rules on tissue after a frame whose smallest element has the share `least` of
-    /// its rest volume. Returns the strain of the tissue at each arm.
+    /// its rest volume. Returns the strain of the tissue at each arm, or
+    /// none of it where the rule against overstretch is off.
     pub(in crate::cell) fn enforce_tissue_limits(&mut self, least: f64, log: &mut PeriodLog) -> Vec<TissueAtArm> {
         let (rules, none) = (self.rules, vec![TissueAtArm::default(); self.arms.len()]);
-        if !(rules.force_guard || rules.pierce || rules.overstretch || rules.relax) {
+        if !(rules.pierce || rules.overstretch || rules.relax) {
             return none;
         }
         let waiting = self.waits.iter().any(|w| *w > 0);
@@ -37,6 +38,9 @@ impl Cell {
             }
         }
         scope.log.events.append(&mut relaxed);
+        if !rules.overstretch {
+            return none;
+        }
         self.arms.iter().map(|arm| TissueAtArm::of(arm, &strains)).collect()
     }
 }
