@@ -155,11 +155,20 @@ impl ContactSet {
             if near {
                 self.near.push(vertex);
             }
-            touching += usize::from(touches);
-            changed += usize::from(touches != state.warm.supported[i]);
             self.touching[i] = touches;
         }
         self.near.extend(hanging);
+        // Edges and triangles that pressed at the end of the last frame.
+        for anchor in &state.feature_anchors {
+            for i in anchor.feature.0 {
+                self.touching[i as usize] |= !self.fixed[i as usize];
+            }
+        }
+        for i in &self.surface {
+            let touches = self.touching[*i as usize];
+            touching += usize::from(touches);
+            changed += usize::from(touches != state.warm.supported[*i as usize]);
+        }
         if changed > MAX_CHANGED_CONTACTS.min(touching / 2) + touching / 8 {
             state.warm.supported.copy_from_slice(&self.touching);
         }
@@ -280,7 +289,7 @@ impl ContactSet {
             *first = next;
         }
         self.of_vertices = contacts.len();
-        self.features.find(frame, body, &self.placed, &self.fixed, self.reach, x, way, &mut contacts);
+        self.features.find(frame, body, &self.placed, &self.fixed, x, way, &mut contacts);
         (self.contacts, self.places) = (contacts, places);
     }
 

@@ -21,6 +21,10 @@ use crate::state::BodyState;
 use glam::{DVec3, Vec3A};
 use trocar_core::Wrench;
 
+/// A point that is expected within this distance of a tool's surface at a substep's end may touch
+/// it (m).
+const MARGIN: f32 = 1e-3;
+
 /// The contacts of a body's edges and triangles.
 #[derive(Default)]
 pub(super) struct FeatureContacts {
@@ -31,6 +35,10 @@ pub(super) struct FeatureContacts {
     vertices: Vec<u32>,
     /// Their positions at the substep's beginning, by vertex (m).
     x: Vec<Vec3A>,
+    /// Scratch: balls around [`CHUNK`] triangles each.
+    balls: Vec<(Vec3A, f32)>,
+    /// Scratch: whether a vertex is one of `vertices`.
+    is_near: Vec<bool>,
     /// Scratch: features of one collider.
     found: Vec<Feature>,
     /// The feature of each contact of the substep.
@@ -56,28 +64,47 @@ impl FeatureContacts {
         self.ends.clear();
         self.vertices.clear();
         self.x.resize(body.len(), Vec3A::ZERO);
+        let triangles = &body.surface.triangles;
+        let corners = |t: u32| triangles[t as usize].map(|i| state.x[i as usize]);
+        self.balls.clear();
         for (collider, placed) in frame.colliders.iter().zip(placed) {
             if let (Some((ends, radius)), Some(placed)) = (axis(&collider.shape), placed) {
+                if self.balls.is_empty() {
+                    self.balls.extend(triangles.chunks(CHUNK).map(|chunk| ball(chunk, &state.x)));
+                }
                 let [a, b] = placed.at_beginning(body, ends);
                 let far = reach + placed.reach + radius;
-                let near = |t: &u32| {
-                    let [p, q, r] = body.surface.triangles[*t as usize].map(|i| state.x[i as usize]);
-                    let size = (q - p).length_squared().max((r - p).length_squared()).sqrt();
-                    distance_squared(p, a, b) <= (far + size) * (far + size)
-                };
-                self.near.extend((0..body.surface.triangles.len() as u32).filter(near));
+                let may_meet = |(centre, size): (Vec3A, f32)| distance_squared(centre, a, b) <= (far + size).powi(2);
+                for (chunk, ball) in self.balls.iter().enumerate() {
+                    if !may_meet(*ball) {
+                        continue;
+                    }
+                    let first = chunk * CHUNK;
+                    let all = first as u32..(first + CHUNK).min(triangles.len()) as u32;
+                    self.near.extend(all.filter(|t| {
+                        let [p, q, r] = corners(*t);
+                        may_meet((p, (q - p).length_squared().max((r - p).length_squared()).sqrt()))
+                    }));
+                }
             }
             self.ends.push(self.near.len());
         }
+        if self.near.is_empty() {
+            return;
+        }
+        self.is_near.clear();
+        self.is_near.resize(body.len(), false);
         for t in &self.near {
             for corner in body.surface.triangles[*t as usize] {
                 for around in body.surface.fan(corner) {
-                    self.vertices.extend(body.surface.triangles[*around as usize]);
+                    for i in body.surface.triangles[*around as usize] {
+                        if !std::mem::replace(&mut self.is_near[i as usize], true) {
+                            self.vertices.push(i);
+                        }
+                    }
                 }
             }
         }
-        self.vertices.sort_unstable();
-        self.vertices.dedup();
     }
 
     /// Appends the contacts of a substep that begins with the vertices at `x`, which go by `way` if
@@ -90,7 +117,6 @@ impl FeatureContacts {
         body: &Body,
         placed: &[Option<Placed>],
         fixed: &[bool],
-        reach: f32,
         x: impl Fn(usize) -> Vec3A,
         way: impl Fn(usize) -> Vec3A,
         contacts: &mut Vec<Contact>,
@@ -99,7 +125,13 @@ impl FeatureContacts {
         if self.near.is_empty() {
             return;
         }
-        self.vertices.iter().for_each(|i| self.x[*i as usize] = x(*i as usize));
+        let mut farthest = 0.0f32;
+        for i in &self.vertices {
+            self.x[*i as usize] = x(*i as usize);
+            farthest = farthest.max(way(*i as usize).length_squared());
+        }
+        // What is expected no nearer in a substep waits for the next one.
+        let reach = MARGIN + farthest.sqrt();
         let mut first = 0;
         for (c, end) in self.ends.iter().enumerate() {
             let triangles = &self.near[first..*end];
@@ -197,6 +229,18 @@ fn stiffness(body: &Body, site: &Site) -> f32 {
     let [u, v, w] = site.weights;
     let share = STIFFNESS * (4.0 * (u * v + v * w + w * u)).min(1.0);
     share * site.shares().map(|(i, weight)| weight * body.vertices[i as usize].contact_stiffness).sum::<f32>()
+}
+
+/// Triangles that are tested at once first. The surface has near ones one after the other.
+const CHUNK: usize = 32;
+
+/// A ball around triangles with their vertices at `x`: centre and radius (m).
+fn ball(triangles: &[[u32; 3]], x: &[Vec3A]) -> (Vec3A, f32) {
+    let (mut low, mut high) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
+    for i in triangles.iter().flatten() {
+        (low, high) = (low.min(x[*i as usize]), high.max(x[*i as usize]));
+    }
+    (0.5 * (low + high), 0.5 * low.distance(high))
 }
 
 /// Squared distance of a point from a segment (m2).

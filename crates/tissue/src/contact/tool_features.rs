@@ -65,13 +65,23 @@ pub(super) fn find(
     for t in triangles {
         let mut vertices = surface.triangles[*t as usize];
         for k in 0..3 {
-            features.extend(of_edge(surface, x, [vertices[k], vertices[(k + 1) % 3]], axis, reach));
+            // An edge is of two triangles, which run along it in opposite directions.
+            let edge = [vertices[k], vertices[(k + 1) % 3]];
+            if edge[0] < edge[1] {
+                features.extend(of_edge(surface, x, edge, axis, reach));
+            }
         }
         let normal = normal(x, vertices);
         // The name begins with the smallest vertex; the turn stays.
         let least = (0..3).min_by_key(|k| vertices[*k]).unwrap_or(0);
         vertices.rotate_left(least);
+        let [p, q, r] = vertices.map(|i| x[i as usize]);
+        let far = reach + (q - p).length_squared().max((r - p).length_squared()).sqrt();
         for (end, place) in axis.iter().enumerate().take(ends) {
+            // Rounding is far smaller than a percent.
+            if place.distance(p) > 1.01 * far {
+                continue;
+            }
             let foot = foot(*place, vertices.map(|i| x[i as usize]));
             let inside = foot.weights.iter().all(|weight| *weight > 0.0);
             if inside && is_near(foot.off, reach) && foot.off.dot(normal) > 0.0 {
@@ -83,11 +93,23 @@ pub(super) fn find(
     features.dedup_by_key(|feature| feature.key);
 }
 
-/// The point of an edge that is nearest to the axis, if it counts.
+/// Whether two segments may be within `reach` (m) of each other: false if a ball around the one is
+/// too far from the other's line.
+fn may_be_near(edge: [Vec3A; 2], axis: [Vec3A; 2], reach: f32) -> bool {
+    let along = axis[1] - axis[0];
+    let off = 0.5 * (edge[0] + edge[1]) - axis[0];
+    let share = (off.dot(along) / along.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+    // Rounding is far smaller than a percent.
+    (off - share * along).length() <= 1.01 * (reach + 0.5 * edge[0].distance(edge[1]))
+}
+
+/// The point of an edge that is nearest to the axis, if it counts. `edge` is ascending.
 fn of_edge(surface: &Surface, x: &[Vec3A], edge: [u32; 2], axis: [Vec3A; 2], reach: f32) -> Option<Feature> {
-    // The same numbers whichever triangle the edge is of.
-    let [i, k] = [edge[0].min(edge[1]), edge[0].max(edge[1])];
+    let [i, k] = edge;
     let ends = [x[i as usize], x[k as usize]];
+    if !may_be_near(ends, axis, reach) {
+        return None;
+    }
     let [share, other] = nearest_of_segments(ends.map(|p| p.as_dvec3()), axis.map(|p| p.as_dvec3())).map(|s| s as f32);
     let off = axis[0] + other * (axis[1] - axis[0]) - (ends[0] + share * (ends[1] - ends[0]));
     if !(share > 0.0 && share < 1.0 && is_near(off, reach)) {

@@ -7,7 +7,7 @@ use super::layout::Layout;
 use super::rigid_modes::RigidModes;
 use super::sleep::{RestCache, Sleep};
 use super::system::System;
-use crate::contact::{Contact, ContactSet, Source};
+use crate::contact::{ContactSet, Source};
 use crate::descent::BodyDescent;
 use crate::frame::Frame;
 use crate::lanes::{Row, dot_rows};
@@ -163,7 +163,7 @@ impl QuasiNewtonSolver {
     }
 
     /// Adds to the matrix the tools and supports that press at the substep's beginning or at its
-    /// free end, of vertices. Returns false if it has them all.
+    /// free end. Returns false if it has them all.
     pub fn add_contacts_to_system(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) -> bool {
         let (x, targets, number) = (&self.iterate.x, &self.iterate.targets, &self.layout.number);
         let places = |vertex: u32| {
@@ -172,13 +172,14 @@ impl QuasiNewtonSolver {
         };
         let mut new = false;
         let contacts = self.touching.contacts.list().iter();
-        let pressed = |contact: &&Contact| contact.site.is_vertex() && !matches!(contact.source, Source::Grasp(..));
-        for contact in contacts.filter(pressed) {
-            let vertex = contact.site.first();
-            let presses = places(vertex).iter().any(|x| contact.height(*x) < 0.0);
-            let known = &mut state.warm.supported[vertex as usize];
-            new |= presses && !*known;
-            *known |= presses;
+        for contact in contacts.filter(|contact| !matches!(contact.source, Source::Grasp(..))) {
+            let presses = |k: usize| contact.height(contact.site.at(|vertex| places(vertex)[k])) < 0.0;
+            if !(presses(0) || presses(1)) {
+                continue;
+            }
+            for (vertex, _) in contact.site.shares() {
+                new |= !std::mem::replace(&mut state.warm.supported[vertex as usize], true);
+            }
         }
         if new {
             self.refresh_system(frame, body, state);

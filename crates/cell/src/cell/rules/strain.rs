@@ -20,7 +20,7 @@ pub(super) const MIN_VOLUME_SHARE: f64 = 0.01;
 const RESTED_VOLUME_SHARE: f64 = 0.05;
 
 /// Volumes are measured if an element is below this share of its rest volume.
-const MEASURED_BELOW: f64 = 0.5;
+const MEASURED_BELOW: f64 = 0.4;
 
 /// Tissue without an instrument at it is checked if an element is below this share of its rest
 /// volume.
@@ -62,26 +62,35 @@ impl Strain {
     }
 }
 
-/// The smallest share of its rest volume that an element of a body has, and the element's centroid
-/// (m).
-fn most_crushed(world: &World, body: usize, now: &[DVec3]) -> (f64, DVec3) {
-    let (data, mut least) = (&world.model.bodies()[body], (1.0, DVec3::ZERO));
-    for tet in data.tets() {
-        let volume = |x: &[DVec3]| {
-            let [a, b, c, d] = tet.map(|i| x[i as usize]);
-            (b - a).cross(c - a).dot(d - a)
-        };
-        let share = volume(now) / volume(data.rest_positions());
-        if share < least.0 {
-            least = (share, tet.iter().map(|i| 0.25 * now[*i as usize]).sum());
-        }
-    }
-    least
+/// Six times the volume of an element with its nodes at `x` (m3).
+fn volume(tet: &[u32; 4], x: &[DVec3]) -> f64 {
+    let [a, b, c, d] = tet.map(|i| x[i as usize]);
+    (b - a).cross(c - a).dot(d - a)
 }
 
-/// The edges of all bodies with their squared rest lengths.
+/// The smallest share of its rest volume (`rest`, times six) that an element of a body has, and the
+/// element's centroid (m).
+fn most_crushed(tets: &[[u32; 4]], rest: &[f64], now: &[DVec3]) -> (f64, DVec3) {
+    let mut least = (1.0, None);
+    for (tet, rest) in tets.iter().zip(rest) {
+        let volume = volume(tet, now);
+        if volume < least.0 * rest {
+            least = (volume / rest, Some(tet));
+        }
+    }
+    (least.0, least.1.map_or(DVec3::ZERO, |tet| tet.iter().map(|i| 0.25 * now[*i as usize]).sum()))
+}
+
+/// What bodies are like at rest: their edges with squared lengths (m2), and six times the volumes
+/// of their elements (m3).
+struct Rest {
+    edges: Vec<([u32; 2], f64)>,
+    volumes: Vec<f64>,
+}
+
+/// The edges and volumes of all bodies at rest.
 pub(crate) struct Edges {
-    bodies: Vec<Vec<([u32; 2], f64)>>,
+    bodies: Vec<Rest>,
     /// The world's number of cuts for which they are valid.
     cuts: usize,
     positions: Vec<DVec3>,
@@ -100,7 +109,8 @@ impl Edges {
             pairs.dedup();
             let rest = body.rest_positions();
             let length = |[a, b]: [u32; 2]| rest[a as usize].distance_squared(rest[b as usize]);
-            pairs.into_iter().map(|e| (e, length(e))).collect()
+            let volumes = body.tets().iter().map(|tet| volume(tet, rest)).collect();
+            Rest { edges: pairs.into_iter().map(|e| (e, length(e))).collect(), volumes }
         });
         Self { bodies: bodies.collect(), cuts: world.cuts, positions: Vec::new() }
     }
@@ -111,7 +121,7 @@ impl Edges {
             *self = Self::of(world);
         }
         let Self { bodies, positions, .. } = self;
-        let strain = |(body, edges): (usize, &Vec<([u32; 2], f64)>)| {
+        let strain = |(body, Rest { edges, volumes }): (usize, &Rest)| {
             positions.clear();
             let count = world.model.bodies()[body].len();
             positions.extend((0..count).map(|i| world.state.position(&world.model, body, i)));
@@ -126,7 +136,7 @@ impl Edges {
             let at = 0.5 * (a + b);
             let mut strain = Strain { stretch: most.sqrt(), volume: 1.0, at, crushed_at: at };
             if least < MEASURED_BELOW {
-                let (volume, at) = most_crushed(world, body, positions);
+                let (volume, at) = most_crushed(world.model.bodies()[body].tets(), volumes, positions);
                 (strain.volume, strain.crushed_at) = (volume, at);
                 // The position of the strain that lasts.
                 if volume >= RESTED_VOLUME_SHARE {
