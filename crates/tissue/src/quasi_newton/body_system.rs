@@ -166,9 +166,11 @@ impl QuasiNewtonSolver {
     /// free end. Returns false if it has them all.
     pub fn add_contacts_to_system(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) -> bool {
         let (x, targets, number) = (&self.iterate.x, &self.iterate.targets, &self.layout.number);
+        let free = self.layout.free;
+        // Edges and triangles may have vertices that are pinned.
         let places = |vertex: u32| {
             let i = number[vertex as usize] as usize;
-            [position(&x[i]), position(&targets[i])]
+            [position(&x[i]), position(if i < free { &targets[i] } else { &x[i] })]
         };
         let mut new = false;
         let contacts = self.touching.contacts.list().iter();
@@ -177,7 +179,7 @@ impl QuasiNewtonSolver {
             if !(presses(0) || presses(1)) {
                 continue;
             }
-            for (vertex, _) in contact.site.shares() {
+            for (vertex, _) in contact.site.shares().filter(|(i, _)| (number[*i as usize] as usize) < free) {
                 new |= !std::mem::replace(&mut state.warm.supported[vertex as usize], true);
             }
         }
