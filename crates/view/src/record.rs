@@ -85,7 +85,8 @@ impl Recorder {
     }
 }
 
-/// A column of who moved an arm in each control period: 0 is the policy, 1 the operator, 2 nobody.
+/// A column that says who moved an arm in each control period: 0 is the policy, 1 the operator, 2
+/// nobody.
 fn actor_column(arm: ArmName, actors: &[[Actor; 2]]) -> Column {
     let values = actors.iter().map(|both| f64::from(both[arm as usize] as u8)).collect();
     Column { name: format!("{}_actor", arm.name()), values }

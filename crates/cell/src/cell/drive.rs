@@ -112,7 +112,7 @@ impl Drive {
         }
     }
 
-    /// Moves an ideal arm by `share`, below 1, of what it would move in a physics step of `dt` (s).
+    /// Moves an ideal arm by a `share` (below 1) of its motion in a physics step of `dt` (s).
     pub fn step_part(&mut self, share: f64, dt: f64) {
         if let Self::Ideal(drive) = self {
             drive.state.step(share, dt);

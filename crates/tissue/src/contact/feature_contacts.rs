@@ -231,7 +231,7 @@ fn stiffness(body: &Body, site: &Site) -> f32 {
     share * site.shares().map(|(i, weight)| weight * body.vertices[i as usize].contact_stiffness).sum::<f32>()
 }
 
-/// Triangles that are tested at once first. The surface has near ones one after the other.
+/// Number of triangles that are tested together first. The surface keeps near ones together.
 const CHUNK: usize = 32;
 
 /// A ball around triangles with their vertices at `x`: centre and radius (m).

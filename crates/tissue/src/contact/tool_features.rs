@@ -65,7 +65,7 @@ pub(super) fn find(
     for t in triangles {
         let mut vertices = surface.triangles[*t as usize];
         for k in 0..3 {
-            // An edge is of two triangles, which run along it in opposite directions.
+            // The two triangles of an edge run along it in opposite directions, so one of them has it.
             let edge = [vertices[k], vertices[(k + 1) % 3]];
             if edge[0] < edge[1] {
                 features.extend(of_edge(surface, x, edge, axis, reach));
@@ -90,6 +90,7 @@ pub(super) fn find(
         }
     }
     features.sort_unstable_by_key(|feature| feature.key);
+    // Edges at which four triangles meet have come twice.
     features.dedup_by_key(|feature| feature.key);
 }
 

@@ -9,7 +9,8 @@ use trocar_core::Pose;
 /// What slides by less than this in a substep (m) sticks.
 const LEAST_SLIP: f32 = 1e-7;
 
-/// The plane of what slides by more than this share of a tool's size in a substep is not predicted.
+/// A contact that slides by more than this share of a tool's size in a substep has no predicted
+/// plane.
 const LONGEST_SLIP: f32 = 0.3;
 
 /// Cosine of the greatest angle between the predicted plane and the present one. Beyond it, the

@@ -79,7 +79,7 @@ impl IslandSystem<'_> {
                 Found::Nothing if stepped && self.is_solved(wide, wide_relative) => break,
                 // Steps of an earlier substep may mislead if contacts have changed.
                 Found::Nothing if self.history.forget() => {}
-                // Sweeps carry bodies that touch and are not held badly: they lose momentum.
+                // Sweeps lose the momentum of bodies that touch each other and that nothing holds.
                 Found::Nothing if stepped && !alone && self.all().any(|body| body.is_free()) => break,
                 Found::Nothing => {
                     self.all().for_each(|body| body.restore());
