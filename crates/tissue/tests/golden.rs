@@ -79,7 +79,7 @@ fn rigid_grasp_and_supports() {
     state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY));
     let tools = |k: usize| vec![at(DVec3::new(1e-3, 0.0, 5e-3) * bump(k, 60))];
     let found = hashes(&model, &state, 60, &tools, &[]);
-    check("rigid grasp and supports", found, [0xf4f93755a719e23c, 0x3c277d201abe13b0, 0x67d8a98d64a5808b]);
+    check("rigid grasp and supports", found, [0xb08631d0e9a8acc5, 0xba4f0004a89c016c, 0xe3742422f98ac601]);
 }
 
 /// A block on a pinned one, a third that flies into them, jaws that lift one compliantly, a probe.
@@ -141,7 +141,7 @@ fn lift_and_probe(frame: usize) -> Vec<Pose> {
 fn bodies_and_tools_that_touch() {
     let (model, state) = touching_bodies();
     let found = hashes(&model, &state, 40, &lift_and_probe, &[]);
-    check("bodies and tools that touch", found, [0xd0b6391597c2223a, 0xc18d125f22a6087f, 0xdcff47f959a781f0]);
+    check("bodies and tools that touch", found, [0x4c4bb30ea75aa11d, 0xc18d125f22a6087f, 0xdcff47f959a781f0]);
 }
 
 /// Loads, a state with inverted elements, and one that is to be relaxed.
@@ -161,7 +161,7 @@ fn loads_and_disturbed_states() {
     let loads = [(0, 40, DVec3::new(0.01, 0.0, 0.02)), (2, 5, DVec3::new(0.0, 1e-3, 1e-3))];
     let loads = loads.map(|(body, node, force)| Load { body, node, force });
     let found = hashes(&model, &state, 20, &lift_and_probe, &loads);
-    check("loads and disturbed states", found, [0xca02d07571da16d5, 0x2aefa14452e87d5c, 0x11524cd02abb7122]);
+    check("loads and disturbed states", found, [0x1e555384261ad5d6, 0x2aefa14452e87d5c, 0x11524cd02abb7122]);
 }
 
 /// A block that a rigid grasp crushes.
@@ -175,7 +175,7 @@ fn crushed_block() {
     state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY));
     let tools = |k: usize| vec![at(DVec3::new(3e-3, 0.0, -5.5e-3) * bump(k, 30))];
     let found = hashes(&model, &state, 30, &tools, &[]);
-    check("crushed block", found, [0x8fe0b41a5763f5aa, 0xaa5ba28d0a7f7b46, 0xd4a0413ba037c401]);
+    check("crushed block", found, [0xc77ac3a65e614889, 0xaa5ba28d0a7f7b46, 0xd4a0413ba037c401]);
 }
 
 /// A block on a plane, crushed and hit by a ball.
@@ -202,7 +202,7 @@ fn struck_block() {
         vec![at(DVec3::new(2e-3, 0.0, -11e-3) * t), at(DVec3::new(8e-3, 0.0, -3e-3) * t)]
     };
     let found = hashes(&model, &state, 24, &tools, &[]);
-    check("struck block", found, [0x15e48d6f0a3a018c, 0x1274898424fbf17c, 0x4faae1f8a7e5c994]);
+    check("struck block", found, [0xc17a9e311e19ab04, 0x1274898424fbf17c, 0x4faae1f8a7e5c994]);
 }
 
 /// Elements pressed almost flat, thrown inwards and hit: it overstretches.
@@ -224,7 +224,7 @@ fn flat_elements() {
     }
     let tools = |k: usize| vec![at(DVec3::new(0.0, 0.0, -9e-3) * bump(k, 6))];
     let found = hashes(&model, &state, 12, &tools, &[]);
-    check("flat elements", found, [0x198430dcb6666d4b, 0x7345bf12772cc00f, 0x1caa3dcc4c6d26f9]);
+    check("flat elements", found, [0x5739346637a2dae7, 0x7345bf12772cc00f, 0x1caa3dcc4c6d26f9]);
 }
 
 /// A spring of negative stiffness: the matrix has no Cholesky factor, and sweeps take over in the

@@ -25,7 +25,7 @@ const REACH_MARGIN: f32 = 1e-3;
 
 /// The matrix stays the same if at most so many vertices more or fewer touch, and an eighth of
 /// them.
-const MAX_CHANGED_CONTACTS: usize = 3;
+const MAX_CHANGED_CONTACTS: usize = 8;
 
 /// The contacts of one body.
 pub(crate) struct ContactSet {

@@ -125,6 +125,7 @@ impl QuasiNewtonSolver {
     pub fn begin_frame(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
         self.iterate.load(&self.layout, state);
         self.mark_held(frame, body);
+        self.rest.has_gradient = false;
         if std::mem::take(&mut self.loads.any) {
             self.loads.forces.fill([0.0; 4]);
         }
@@ -228,6 +229,13 @@ impl QuasiNewtonSolver {
         self.system.update_warp(self.level, &self.layout, &self.iterate.x);
     }
 
+    /// Updates the system for the elements that are squeezed where the nodes are. The contacts are to
+    /// be updated after it.
+    pub fn update_squeezed(&mut self) {
+        let Self { level, system, layout, elements, held, iterate, .. } = self;
+        system.update_squeezed(*level, layout, elements, held, &iterate.x);
+    }
+
     /// Updates the system for the contacts that press where the nodes are.
     pub fn update_contacts(&mut self) {
         let Self { level, system, layout, touching, held, iterate, .. } = self;
@@ -237,8 +245,7 @@ impl QuasiNewtonSolver {
     /// Writes the gradient of the body's own potential into the next gradient, from the forces of
     /// the last evaluation; 0 at held nodes.
     pub fn take_gradient(&mut self, h: f32) {
-        let level = self.level;
-        dispatch!(level, simd => self.gradient_at(simd, h));
+        self.take_own_gradient(h);
         let Self { iterate: Iterate { x, next_gradient, .. }, touching, loads, layout, held, .. } = self;
         for (contact, limit) in touching.contacts.list().iter().zip(&touching.limits) {
             let number = |vertex: u32| layout.number[vertex as usize] as usize;
@@ -259,7 +266,7 @@ impl QuasiNewtonSolver {
     }
 
     #[inline(always)]
-    fn gradient_at<S: Simd>(&mut self, simd: S, h: f32) {
+    pub(super) fn gradient_at<S: Simd>(&mut self, simd: S, h: f32) {
         let inertia = 1.0 / (h * h);
         let Self { iterate: Iterate { x, predictor, next_gradient, .. }, layout, elements, held, .. } = self;
         for i in 0..layout.free {

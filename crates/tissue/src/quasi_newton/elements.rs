@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 /// Forces and volume ratios of the elements.
 pub(super) struct Elements {
-    stress: Stress,
+    pub stress: Stress,
     /// Gradient of the energy by each corner's position (N), batch by batch, corner by corner.
     pub corners: Vec<Row>,
     /// Volume ratios at the accepted positions, and at those of the last evaluation.

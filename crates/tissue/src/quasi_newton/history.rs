@@ -21,6 +21,10 @@ pub(crate) struct History {
     /// Pairs in use; the newest is that of this number.
     pub count: usize,
     pub newest: usize,
+    /// The preconditioner's solutions are taken times this, as in Nocedal and Wright 2006, "Numerical
+    /// Optimization", equation 7.20, but learned from the line search, which needs no other solve:
+    /// the matrix at rest is too soft for squeezed and pressed tissue.
+    pub scale: f32,
     /// 1 / (step . change) of each pair.
     pub inverses: Vec<f32>,
     /// Scratch of the two loops.
@@ -29,6 +33,9 @@ pub(crate) struct History {
 
 /// A pair whose curvature is below this share of its lengths is not used.
 pub(super) const MIN_CURVATURE_SHARE: f32 = 1e-6;
+
+/// Smallest scale of the preconditioner's solutions.
+const MIN_SCALE: f32 = 0.3;
 
 impl Memory {
     /// Room for `pairs` of vectors of `rows`.
@@ -84,7 +91,7 @@ impl Memory {
 impl History {
     /// Room for `pairs`.
     pub fn new(pairs: usize) -> Self {
-        Self { count: 0, newest: 0, inverses: vec![0.0; pairs], shares: vec![0.0; pairs] }
+        Self { count: 0, newest: 0, scale: 1.0, inverses: vec![0.0; pairs], shares: vec![0.0; pairs] }
     }
 
     /// Forgets all pairs.
@@ -95,6 +102,12 @@ impl History {
     /// Forgets all pairs. Returns whether there was any.
     pub fn forget(&mut self) -> bool {
         std::mem::take(&mut self.count) > 0
+    }
+
+    /// Learns which share of a direction would have been `best`. What the pairs know already has the
+    /// right length, so it is the rest that was too long or too short.
+    pub fn learn_scale(&mut self, best: f32) {
+        self.scale = (self.scale * best).clamp(MIN_SCALE, 1.0);
     }
 
     /// Number of the pair that is `age` steps older than the newest.

@@ -8,6 +8,9 @@ const SLOPE_SHARE: f32 = 0.5;
 /// Greatest number of shares that a search tries after the first.
 const MAX_LINE_SEARCH_TRIALS: usize = 8;
 
+/// Greatest factor of a share that another one is inferred from.
+const MAX_GROWTH: f32 = 5.0;
+
 /// The result of a search.
 pub(super) enum Found {
     /// A step was taken; gradient and history are up to date.
@@ -60,6 +63,12 @@ impl IslandSystem<'_> {
             let last = trial == MAX_LINE_SEARCH_TRIALS;
             let falls = there <= SLOPE_SHARE * slope.abs();
             if falls && (above.is_none() || there >= -SLOPE_SHARE * slope.abs() || last) {
+                // Where the slope would vanish if it were linear.
+                let best = share * (slope / (slope - there).min(-f32::MIN_POSITIVE)).min(MAX_GROWTH);
+                // Free bodies go as far as the coarse half of the preconditioner says.
+                if !self.all().any(|body| body.is_free()) {
+                    self.history.learn_scale(best);
+                }
                 break;
             }
             if last {

@@ -1,5 +1,5 @@
-//! Contacts that began or ended since the matrix was factorised, as a low-rank update of its
-//! inverse.
+//! Contacts that began or ended since the matrix was factorised, and squeezed elements, as a low-rank
+//! update of its inverse.
 //!
 //! The factor contains the stiffness of the nodes that pressed when it was made. New and lost
 //! contacts differ from it by a stiffness on a few nodes: a matrix of low rank. By Woodbury's
@@ -7,14 +7,21 @@
 //! factor less a product of a few of its columns. A node costs three solves once, and each solve
 //! then costs three products with vectors. The stiffness is the same in all directions, so the
 //! columns are kept in the tissue's rest frame and stay valid however it turns.
+//!
+//! A squeezed element has one direction and one column, which is solved for in every substep.
 
 use super::factor::Factor;
+use super::squeezed::{MAX_SQUEEZED, Squeezed};
 use fearless_simd::Simd;
 
 /// Greatest number of nodes in the update.
 const MAX_NODES: usize = 16;
 
-/// The difference between the contacts now and those in the factor.
+/// Greatest number of directions in the update.
+const MAX_DIRECTIONS: usize = 3 * MAX_NODES + MAX_SQUEEZED;
+
+/// The difference between the matrix now and the factor. Its directions are three of each node, then
+/// one of each squeezed element.
 pub(super) struct LowRankUpdate {
     /// Nodes and the stiffness that is added (N/m); those whose stiffness is taken out of the
     /// factor come first.
@@ -25,9 +32,14 @@ pub(super) struct LowRankUpdate {
     /// Nodes whose columns of the factor's inverse are known, and three columns of each.
     known: Vec<u32>,
     columns: Vec<f32>,
+    /// Elements that are squeezed, gradients in the rest frame, and a column of each.
+    squeezed: Vec<Squeezed>,
+    squeezed_columns: Vec<f32>,
+    /// Whether the elements have changed since the matrix was made.
+    stale: bool,
     /// Numbers of a column.
     length: usize,
-    /// 1 / stiffness + the inverse's block of the nodes, as L D L': what is below the diagonal of
+    /// 1 / stiffness + the inverse's block of the directions, as L D L': what is below the diagonal of
     /// L, and D on it.
     matrix: Vec<f64>,
     shares: Vec<f64>,
@@ -45,24 +57,40 @@ impl LowRankUpdate {
             known: Vec::with_capacity(MAX_NODES),
             // Zeros take no memory until a column is written.
             columns: vec![0.0; 3 * MAX_NODES * length],
+            squeezed: Vec::with_capacity(MAX_SQUEEZED),
+            squeezed_columns: vec![0.0; MAX_SQUEEZED * length],
+            stale: false,
             length,
-            matrix: vec![0.0; 9 * MAX_NODES * MAX_NODES],
-            shares: vec![0.0; 3 * MAX_NODES],
+            matrix: vec![0.0; MAX_DIRECTIONS * MAX_DIRECTIONS],
+            shares: vec![0.0; MAX_DIRECTIONS],
             usable: false,
         }
     }
 
     /// Forgets everything: the factor has changed.
     pub fn clear(&mut self) {
-        self.nodes.clear();
         self.known.clear();
-        self.usable = false;
+        self.reset();
     }
 
-    /// Makes the update empty: the contacts are those in the factor.
+    /// Makes the update empty: the contacts are those in the factor, and no element is squeezed.
     pub fn reset(&mut self) {
         self.nodes.clear();
-        self.usable = false;
+        self.squeezed.clear();
+        (self.usable, self.stale) = (false, false);
+    }
+
+    /// Takes the squeezed elements out.
+    pub fn forget_squeezed(&mut self) {
+        if !self.squeezed.is_empty() {
+            self.squeezed.clear();
+            self.usable = self.factorise();
+        }
+    }
+
+    /// Whether [`Self::set`] is to follow, because elements have changed.
+    pub fn is_stale(&self) -> bool {
+        self.stale
     }
 
     /// What the update adds to a node's stiffness (N/m).
@@ -84,12 +112,33 @@ impl LowRankUpdate {
     ) {
         self.next.clear();
         self.next.extend(nodes.take(MAX_NODES));
-        if self.next == self.nodes {
+        if self.next == self.nodes && !self.stale {
             return;
         }
+        self.stale = false;
         std::mem::swap(&mut self.nodes, &mut self.next);
         self.solve_columns(simd, factor, scratch);
         self.usable = self.factorise();
+    }
+
+    /// Sets the squeezed elements, gradients in the rest frame, at most [`MAX_SQUEEZED`]. The nodes are
+    /// to be set after it.
+    #[inline(always)]
+    pub fn set_squeezed<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32], squeezed: &[Squeezed]) {
+        if self.squeezed == squeezed {
+            return;
+        }
+        self.squeezed.clear();
+        self.squeezed.extend_from_slice(squeezed);
+        for (element, column) in squeezed.iter().zip(self.squeezed_columns.chunks_exact_mut(self.length)) {
+            scratch.fill(0.0);
+            for (node, g) in element.nodes.iter().zip(&element.gradient) {
+                (0..3).for_each(|c| scratch[3 * *node as usize + c] += g[c]);
+            }
+            factor.solve(simd, scratch);
+            column.copy_from_slice(&scratch[..self.length]);
+        }
+        self.stale = true;
     }
 
     /// Solves for the columns that are not known.
@@ -120,16 +169,39 @@ impl LowRankUpdate {
         }
     }
 
-    /// Builds the matrix of the nodes and its L D L'. False if the sum is not positive definite.
+    /// Product of a direction and a vector.
+    #[inline(always)]
+    fn product(&self, i: usize, x: &[f32]) -> f64 {
+        match i.checked_sub(3 * self.nodes.len()) {
+            None => f64::from(x[3 * self.nodes[i / 3].0 as usize + i % 3]),
+            Some(e) => self.squeezed[e].product(x),
+        }
+    }
+
+    /// Stiffness of a direction.
+    fn stiffness(&self, i: usize) -> f64 {
+        f64::from(match i.checked_sub(3 * self.nodes.len()) {
+            None => self.nodes[i / 3].1,
+            Some(e) => self.squeezed[e].stiffness,
+        })
+    }
+
+    /// The factor's inverse times a direction.
+    fn column(&self, i: usize) -> &[f32] {
+        match i.checked_sub(3 * self.nodes.len()) {
+            None => &self.columns[(3 * self.places[i / 3] + i % 3) * self.length..][..self.length],
+            Some(e) => &self.squeezed_columns[e * self.length..][..self.length],
+        }
+    }
+
+    /// Builds the matrix of the directions and its L D L'. False if the sum is not positive definite.
     fn factorise(&mut self) -> bool {
-        let n = 3 * self.nodes.len();
+        let n = 3 * self.nodes.len() + self.squeezed.len();
         for j in 0..n {
-            let column = &self.columns[(3 * self.places[j / 3] + j % 3) * self.length..][..self.length];
             for i in j..n {
-                let node = self.nodes[i / 3].0 as usize;
-                self.matrix[i * n + j] = f64::from(column[3 * node + i % 3]);
+                self.matrix[i * n + j] = self.product(i, self.column(j));
             }
-            self.matrix[j * n + j] += 1.0 / f64::from(self.nodes[j / 3].1);
+            self.matrix[j * n + j] += 1.0 / self.stiffness(j);
         }
         for j in 0..n {
             for i in j..n {
@@ -140,7 +212,7 @@ impl LowRankUpdate {
             }
             // Removed contacts make the matrix negative there, added ones positive: it is
             // quasi-definite.
-            let d = self.matrix[j * n + j] * f64::from(self.nodes[j / 3].1);
+            let d = self.matrix[j * n + j] * self.stiffness(j);
             if d.is_nan() || d <= 0.0 {
                 return false;
             }
@@ -154,17 +226,19 @@ impl LowRankUpdate {
         if !self.usable {
             return;
         }
-        let n = 3 * self.nodes.len();
-        let (matrix, shares) = (&self.matrix, &mut self.shares[..n]);
+        let of_nodes = 3 * self.nodes.len();
+        let n = of_nodes + self.squeezed.len();
         for i in 0..n {
-            let known: f64 = (0..i).map(|k| matrix[i * n + k] * shares[k]).sum();
-            shares[i] = f64::from(x[3 * self.nodes[i / 3].0 as usize + i % 3]) - known;
+            let known: f64 = (0..i).map(|k| self.matrix[i * n + k] * self.shares[k]).sum();
+            self.shares[i] = self.product(i, x) - known;
         }
+        let (matrix, shares) = (&self.matrix, &mut self.shares[..n]);
         for i in (0..n).rev() {
             let known: f64 = (i + 1..n).map(|k| matrix[k * n + i] * shares[k]).sum();
             shares[i] = shares[i] / matrix[i * n + i] - known;
         }
         let x = &mut x[..self.length];
+        let (shares, of_squeezed) = shares.split_at(of_nodes);
         for (place, shares) in self.places.iter().zip(shares.chunks_exact(3)) {
             let columns = &self.columns[3 * place * self.length..3 * (place + 1) * self.length];
             let (a, rest) = columns.split_at(self.length);
@@ -173,6 +247,10 @@ impl LowRankUpdate {
             for (((x, a), b), c) in x.iter_mut().zip(a).zip(b).zip(c) {
                 *x -= s * a + t * b + u * c;
             }
+        }
+        for (column, share) in self.squeezed_columns.chunks_exact(self.length).zip(of_squeezed) {
+            let share = *share as f32;
+            x.iter_mut().zip(column).for_each(|(x, c)| *x -= share * c);
         }
     }
 }

@@ -34,6 +34,7 @@ impl IslandSystem<'_> {
         self.choose_active(alone);
         self.for_active(|body| {
             if body.progress.guess != InitialGuess::Still {
+                body.update_squeezed();
                 body.update_contacts();
             }
         });
@@ -45,6 +46,7 @@ impl IslandSystem<'_> {
             self.rest_alone(absolute.min(at_rest));
         }
         let mut rounds = 0;
+        self.history.scale = 1.0;
         for iteration in usize::from(behind)..settings.iterations {
             if self.active().next().is_none() {
                 // Nothing moves, and nothing has moved.
@@ -52,7 +54,8 @@ impl IslandSystem<'_> {
             }
             self.find_direction();
             self.count_iteration();
-            self.for_active(|body| body.measure_direction(iteration == 0));
+            let scale = self.history.scale;
+            self.for_active(|body| body.measure_direction(iteration == 0, scale));
             if self.is_solved(absolute, relative) {
                 if iteration > 0 || moved {
                     if !alone && self.wake(absolute, relative) {

@@ -18,7 +18,27 @@ impl QuasiNewtonSolver {
         elements.accept();
         rest.x.copy_from_slice(&iterate.x);
         rest.start.copy_from_slice(&iterate.start);
-        (elements.in_place, rest.warped) = (true, false);
+        elements.in_place = true;
+        (rest.warped, rest.has_gradient) = (false, false);
+    }
+
+    /// Writes the gradient of elements and inertia into the next gradient: a known one while the body
+    /// stays where it is.
+    pub fn take_own_gradient(&mut self, h: f32) {
+        let Self { elements, iterate, rest, .. } = self;
+        let stays = elements.in_place && iterate.x == rest.x;
+        if stays && rest.has_gradient && iterate.predictor == rest.predictor {
+            iterate.next_gradient.copy_from_slice(&rest.gradient);
+            return;
+        }
+        let level = self.level;
+        dispatch!(level, simd => self.gradient_at(simd, h));
+        let Self { iterate, rest, .. } = self;
+        if stays {
+            rest.gradient.copy_from_slice(&iterate.next_gradient);
+            rest.predictor.copy_from_slice(&iterate.predictor);
+        }
+        rest.has_gradient = stays;
     }
 
     /// Whether no node moves farther than `way` (m) freely in a substep of `h` (s), and no tool
@@ -68,9 +88,10 @@ impl QuasiNewtonSolver {
         targets[..free].copy_from_slice(&x[..free]);
     }
 
-    /// Measures the direction and the body's motion, which is zero before the `first` step.
-    pub fn measure_direction(&mut self, first: bool) {
-        self.progress.longest = dispatch!(self.level, _simd => max_coordinate(&self.iterate.direction));
+    /// Measures the direction, as it would be without the `scale`, and the body's motion, which is zero
+    /// before the `first` step.
+    pub fn measure_direction(&mut self, first: bool, scale: f32) {
+        self.progress.longest = dispatch!(self.level, _simd => max_coordinate(&self.iterate.direction)) / scale;
         self.progress.gone = if first { 0.0 } else { self.gone() };
     }
 

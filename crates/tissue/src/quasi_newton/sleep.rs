@@ -23,6 +23,11 @@ pub(super) struct RestCache {
     pub start: Vec<Row>,
     /// Whether the warp belongs to that place.
     pub warped: bool,
+    /// Gradient of elements and inertia at that place, and the predictor for which it holds; whether
+    /// it is known.
+    pub gradient: Vec<Row>,
+    pub predictor: Vec<Row>,
+    pub has_gradient: bool,
     /// Positions and gradient for which the correction was last computed.
     pub correction_x: Vec<Row>,
     pub correction_gradient: Vec<Row>,
@@ -39,6 +44,9 @@ impl RestCache {
             x: all(),
             start: all(),
             warped: false,
+            gradient: rows(),
+            predictor: rows(),
+            has_gradient: false,
             correction_x: rows(),
             correction_gradient: rows(),
             correction: None,

@@ -50,6 +50,18 @@ impl Stress {
         }
     }
 
+    /// How much larger the second derivative of the energy by the volume ratio is at `ratio` than at
+    /// rest (Pa).
+    pub fn hardening(&self, ratio: f32) -> f32 {
+        match self {
+            Self::StableNeoHookean { volume, .. } | Self::Corotated { volume, .. } => {
+                let (.., curvature) = volume.energy.at(f64::from(ratio).max(MIN_LOGARITHM_RATIO));
+                (curvature - volume.energy.modulus) as f32
+            }
+            Self::StVenantKirchhoff { .. } => 0.0,
+        }
+    }
+
     /// First Piola-Kirchhoff stress of F, whose determinant is `ratio`.
     #[inline(always)]
     pub fn at<S: Simd>(&self, simd: S, f: &Mat3L<S>, ratio: f32x16<S>) -> Mat3L<S> {

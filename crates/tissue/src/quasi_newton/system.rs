@@ -1,10 +1,12 @@
 //! The linear system of one body: its stiffness at rest with the masses of a substep, factorised
 //! once, turned with the tissue, and updated for contacts. It preconditions the search.
 
+use super::elements::Elements;
 use super::factor::Factor;
 use super::iterate::{add, position};
 use super::layout::Layout;
 use super::low_rank_update::LowRankUpdate;
+use super::squeezed::{MAX_SQUEEZED, Squeezed};
 use super::warp::Warp;
 use crate::Body;
 use crate::contact::{ContactSet, Source};
@@ -16,7 +18,7 @@ use glam::{Mat3A, Vec3A};
 pub(super) struct System {
     /// None if no node is free.
     factor: Option<Factor>,
-    /// Contacts that are not in the factor, or no longer there.
+    /// Contacts and stiffness of squeezed elements that are not in the factor, or no longer there.
     update: LowRankUpdate,
     warp: Warp,
     /// Nodes that press in the factor, and their stiffness (N/m); negative where they no longer do.
@@ -29,6 +31,8 @@ pub(super) struct System {
     pub usable: bool,
     /// Scratch: stiffness of what presses each free node now (N/m).
     pressing: Vec<f32>,
+    /// Scratch: the squeezed elements.
+    squeezed: Vec<Squeezed>,
     /// Scratch: the vector of a solve.
     right: Vec<f32>,
 }
@@ -54,6 +58,7 @@ impl System {
             held,
             contacts,
             pressing: vec![0.0; layout.free],
+            squeezed: Vec::with_capacity(MAX_SQUEEZED),
             right: vec![0.0; 3 * layout.rows + 16],
             factor,
         };
@@ -93,15 +98,33 @@ impl System {
         stale
     }
 
-    /// Begins a substep: the contacts are those in the factor.
+    /// Begins a substep: the contacts are those in the factor, and no element is squeezed.
     pub fn reset_update(&mut self) {
         self.update.reset();
+    }
+
+    /// Updates the inverse for the elements that are squeezed at the positions `x`. The contacts are
+    /// to be updated after it.
+    pub fn update_squeezed(&mut self, level: Level, layout: &Layout, elements: &Elements, held: &[bool], x: &[Row]) {
+        let Self { factor: Some(factor), update, warp, squeezed, right, .. } = self else { return };
+        elements.find_squeezed(layout, x, held, squeezed);
+        for element in squeezed.iter_mut() {
+            for (node, g) in element.nodes.iter().zip(&mut element.gradient) {
+                *g = warp.turn_back(*node, *g);
+            }
+        }
+        dispatch!(level, simd => update.set_squeezed(simd, factor, right, squeezed));
+    }
+
+    /// Takes the squeezed elements out of the inverse.
+    pub fn forget_squeezed(&mut self) {
+        self.update.forget_squeezed();
     }
 
     /// Updates the inverse for the contacts that press at the positions `x`.
     pub fn update_contacts(&mut self, level: Level, layout: &Layout, contacts: &ContactSet, held: &[bool], x: &[Row]) {
         let Self { factor: Some(factor), update, pressing, known, right, .. } = self else { return };
-        if contacts.list().is_empty() && known.is_empty() {
+        if contacts.list().is_empty() && known.is_empty() && !update.is_stale() {
             return;
         }
         pressing.fill(0.0);

@@ -57,6 +57,8 @@ impl QuasiNewtonSolver {
     /// Adds the stiffness of `body` against the tools of `group`: rows are force (N) and torque
     /// (N m), columns are translation (m) and rotation (rad).
     pub(super) fn add_stiffness(&mut self, body: &Body, group: &ToolGroup<'_>, sum: &mut [[f64; 6]; 6]) {
+        // Elements are as stiff as at rest.
+        self.system.forget_squeezed();
         let springs = self.springs(body, group);
         if !springs.iter().any(Spring::moves) {
             return;

@@ -2,7 +2,7 @@
 
 use super::history::MIN_CURVATURE_SHARE;
 use super::island_system::IslandSystem;
-use crate::lanes::{add_rows, dot_rows};
+use crate::lanes::{Row, add_rows, dot_rows};
 use fearless_simd::dispatch;
 
 impl IslandSystem<'_> {
@@ -11,9 +11,13 @@ impl IslandSystem<'_> {
         self.assemble_rigid_modes();
         self.active().for_each(|body| body.iterate.direction.copy_from_slice(&body.iterate.gradient));
         self.first_loop();
+        let scale = self.history.scale;
         self.for_active(|body| {
             body.remove_rigid_modes();
             body.precondition();
+            if scale != 1.0 {
+                scale_rows(&mut body.iterate.direction, scale);
+            }
             body.add_rigid_modes();
         });
         self.second_loop();
@@ -97,4 +101,8 @@ impl IslandSystem<'_> {
             }
         }
     }
+}
+
+fn scale_rows(rows: &mut [Row], by: f32) {
+    rows.as_flattened_mut().iter_mut().for_each(|number| *number *= by);
 }

@@ -63,6 +63,12 @@ impl Warp {
         }
     }
 
+    /// Turns one vector of a node into its rest frame.
+    pub fn turn_back(&self, node: u32, v: [f32; 3]) -> [f32; 3] {
+        let (columns, lane) = (&self.nodes[node as usize / LANES].columns, node as usize % LANES);
+        std::array::from_fn(|c| (0..3).map(|k| columns[c][k][lane] * v[k]).sum())
+    }
+
     /// Turns rows into the nodes' rest frames, three numbers a node.
     #[inline(always)]
     pub fn to_rest<S: Simd>(&self, simd: S, rows: &[Row], out: &mut [f32]) {
