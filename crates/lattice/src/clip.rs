@@ -5,12 +5,18 @@ use glam::DVec3;
 /// Four corners, in any order.
 pub(crate) type Tet = [DVec3; 4];
 
-/// Tetrahedra of less volume are dropped (cells).
+/// Tetrahedra of less volume (cells) are dropped: it is not above the rounding of a flat one.
 const MIN_VOLUME: f64 = 1e-15;
 
 /// Volume of a tetrahedron (cells), positive.
 pub(crate) fn volume([a, b, c, d]: &Tet) -> f64 {
     (*b - *a).cross(*c - *a).dot(*d - *a).abs() / 6.0
+}
+
+/// The point from `a` towards `b` by a share of the way. A coordinate that both have is kept to the
+/// bit, so that points in a plane of the grid stay there.
+fn between(a: DVec3, b: DVec3, share: f64) -> DVec3 {
+    a + (b - a) * share
 }
 
 /// Cuts `tet` by the plane at `at` across `axis`. Appends the tetrahedra of both sides.
@@ -25,7 +31,7 @@ pub(crate) fn split(tet: &Tet, axis: usize, at: f64, below: &mut Vec<Tet>, above
         return above.push(*tet);
     }
     let cut = |a: usize, b: usize| {
-        let mut p = tet[a].lerp(tet[b], height[a] / (height[a] - height[b]));
+        let mut p = between(tet[a], tet[b], height[a] / (height[a] - height[b]));
         p[axis] = at;
         p
     };
@@ -67,8 +73,13 @@ pub(crate) fn section(tet: &Tet, axis: usize, at: f64) -> Vec<DVec3> {
     points.extend((0..4).filter(|i| height[*i] == 0.0).map(|i| tet[i]));
     // In this order two low and two high corners give a quadrilateral without crossing sides.
     for (n, a) in side(true).enumerate() {
-        let mut cuts: Vec<DVec3> =
-            side(false).map(|b| tet[a].lerp(tet[b], height[a] / (height[a] - height[b]))).collect();
+        let cut = |b: usize| {
+            // Exactly in the plane: the section may lie in the side of a cell.
+            let mut p = between(tet[a], tet[b], height[a] / (height[a] - height[b]));
+            p[axis] = at;
+            p
+        };
+        let mut cuts: Vec<DVec3> = side(false).map(cut).collect();
         if n % 2 == 1 {
             cuts.reverse();
         }
@@ -91,7 +102,7 @@ pub(crate) fn area_in_cell(polygon: &[DVec3], cell: DVec3) -> f64 {
                     kept.push(*a);
                 }
                 if (da < 0.0) != (db < 0.0) {
-                    kept.push(a.lerp(*b, da / (da - db)));
+                    kept.push(between(*a, *b, da / (da - db)));
                 }
             }
             points = kept;

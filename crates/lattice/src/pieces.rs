@@ -8,8 +8,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 use trocar_geometry::TetMesh;
 
-/// Sections and faces with less area do not connect what lies on their two sides (cells).
-const MIN_AREA: f64 = 1e-9;
+/// Sections and faces with less area (cells) do not connect what lies on their two sides. It is
+/// above the rounding of an area and below the square of the distance at which nodes are moved to
+/// the grid's planes.
+const MIN_AREA: f64 = 1e-15;
 
 /// The part of one tetrahedron inside one cell.
 #[derive(Clone, Copy, Debug)]

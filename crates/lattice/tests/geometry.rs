@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use trocar_geometry::{TetMesh, TriMesh};
 use trocar_lattice::{Lattice, LatticeOptions};
 use trocar_testing::blocks::{appendix, block, noise};
@@ -66,6 +66,22 @@ fn an_aligned_block_has_full_cells() {
         assert_eq!(lattice.hexahedra().len(), cells.iter().product::<usize>());
         assert_eq!(lattice.nodes().len(), cells.iter().map(|n| n + 1).product::<usize>());
         assert!(lattice.hexahedra().iter().all(|hex| hex.is_full()));
+    }
+}
+
+/// So has one that the grid does not fit: nothing is split, and every corner is one node.
+#[test]
+fn a_block_across_the_grid_has_one_node_a_corner() {
+    let mesh = block([12, 4, 3], 2e-3);
+    let (_, size) = mesh.bounds().unwrap();
+    for k in 0..60 {
+        let cell = 1e-3 * (1.1 + 0.05 * k as f64);
+        let below = DVec3::new(noise(k), noise(100 + k), noise(200 + k)) * cell;
+        let options = LatticeOptions { origin: Some(-below), ..LatticeOptions::new(cell) };
+        let lattice = Lattice::of_mesh(&mesh, &options).unwrap();
+        let cells = ((size + below) / cell).ceil();
+        assert_eq!(lattice.hexahedra().len() as f64, cells.element_product(), "{cell}");
+        assert_eq!(lattice.nodes().len() as f64, (cells + 1.0).element_product(), "{cell}");
     }
 }
 
@@ -144,7 +160,30 @@ fn the_lattice_of_a_connected_body_is_connected() {
             }
         }
         assert!(part.iter().all(|p| *p == 0));
-        println!("{} mm: {} doubled cells", 1e3 * cell, lattice.doubled_cells());
+        println!("{} mm: {} nodes at {} corners", 1e3 * cell, lattice.nodes().len(), corners(&lattice));
+        assert_eq!(lattice.doubled_cells(), 0);
+    }
+}
+
+/// Number of grid corners that have a node.
+fn corners(lattice: &Lattice) -> usize {
+    let mut corners: Vec<_> = lattice.nodes().iter().map(|p| p.to_array().map(f64::to_bits)).collect();
+    corners.sort_unstable();
+    corners.dedup();
+    corners.len()
+}
+
+/// Nothing of a convex body is split at any rotation: each corner of the grid is one node.
+#[test]
+fn a_turned_block_has_one_node_a_corner() {
+    for k in 0..40 {
+        let number = |i: u64| 6.0 * noise(10 * k + i);
+        let turn = DQuat::from_euler(glam::EulerRot::XYZ, number(0), number(1), number(2));
+        let mut mesh = block([6, 4, 3], 2e-3);
+        mesh.vertices.iter_mut().for_each(|p| *p = turn * *p);
+        let lattice = Lattice::of_mesh(&mesh, &LatticeOptions::new(1e-3 * (0.8 + number(3)))).unwrap();
+        assert_eq!((lattice.doubled_cells(), corners(&lattice)), (0, lattice.nodes().len()), "{k}");
+        assert!((lattice.volume() / mesh.volume() - 1.0).abs() < 1e-9);
     }
 }
 

@@ -57,7 +57,7 @@ fn a_column_stretches_as_theory_says() {
             let options = LatticeOptions { origin, ..LatticeOptions::new(cell) };
             let body = body(&mesh, options, material(law, 0.0), |p| p.z < 1e-9);
             let mut state = BodyState::new(&body);
-            let mut newton = Newton::new(&body, Precision { gradient: 1e-12, ..Precision::default() }).unwrap();
+            let mut newton = Newton::new(&body, Precision { gradient: 1e-11, ..Precision::default() }).unwrap();
             newton.settle(&body, &Conditions::gravity(DVec3::Z * 9.81 * share), &mut state).unwrap();
             let points = body.lattice().embed_nodes().unwrap();
             let scale = 1200.0 * 9.81 * share / 12e3;

@@ -1,0 +1,75 @@
+//! A clamped beam under its weight against quadratic tetrahedra of scikit-fem
+//! (`oracles/skfem_beam.py` makes the fixture).
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
+
+use glam::DVec3;
+use trocar_lattice::{
+    Body, BodyDescription, BodyState, BoundaryRule, Conditions, Lattice, LatticeOptions, Law, Material, Newton,
+    Precision,
+};
+use trocar_testing::blocks::block;
+
+/// The fixture's probes and displacements (m) for a Poisson's ratio.
+fn reference(nu: f64) -> Vec<(DVec3, DVec3)> {
+    let heading = format!("nu {nu} ");
+    let lines = include_str!("fixtures/skfem_beam.txt").lines().skip_while(|line| !line.starts_with(&heading)).skip(1);
+    let pair = |line: &str| -> Option<(DVec3, DVec3)> {
+        let numbers: Vec<f64> = line.split(' ').map_while(|x| x.parse().ok()).collect();
+        let [a, b, c, d, e, f] = <[f64; 6]>::try_from(numbers).ok()?;
+        Some((DVec3::new(a, b, c), DVec3::new(d, e, f)))
+    };
+    lines.map_while(pair).collect()
+}
+
+/// Mean distance from the reference over the mean displacement.
+fn error(law: Law, nu: f64, options: LatticeOptions) -> f64 {
+    // The lattice is cut from this mesh; it does not matter how fine that is.
+    let mesh = block([12, 4, 3], 2e-3);
+    let lattice = Lattice::of_mesh(&mesh, &options).unwrap();
+    let fixed = (0..lattice.nodes().len() as u32).filter(|i| lattice.nodes()[*i as usize].x < 1e-9).collect();
+    let material = Material { law, young_modulus: 12e3, poisson_ratio: nu, density: 1200.0 };
+    let body = Body::new(BodyDescription { name: "beam".into(), lattice, material, pins: vec![], fixed }).unwrap();
+    let mut state = BodyState::new(&body);
+    let mut newton = Newton::new(&body, Precision::default()).unwrap();
+    newton.settle(&body, &Conditions::gravity(DVec3::Z * -9.81e-3), &mut state).unwrap();
+    let reference = reference(nu);
+    assert_eq!(reference.len(), 27);
+    let probes: Vec<DVec3> = reference.iter().map(|(p, _)| *p).collect();
+    let points = body.lattice().embed(&probes).unwrap();
+    let off = |(point, (p, u)): (&trocar_lattice::EmbeddedPoint, &(DVec3, DVec3))| {
+        (point.interpolate(&state.positions) - *p - *u).length()
+    };
+    let sum: f64 = points.iter().zip(&reference).map(off).sum();
+    sum / reference.iter().map(|(_, u)| u.length()).sum::<f64>()
+}
+
+/// Full cells converge at second order, for every Poisson's ratio. The reference is itself off by
+/// some 0.3%: at the edges of the clamped side the stress is singular.
+#[test]
+fn full_cells_converge_to_quadratic_tetrahedra() {
+    for law in Law::ALL {
+        for nu in [0.3, 0.45, 0.49, 0.499] {
+            let off = [2e-3, 1e-3].map(|cell| error(law, nu, LatticeOptions::new(cell)));
+            println!("{law:?}, nu {nu}: off by {off:.4?}");
+            assert!(off[0] < 0.035 && off[1] < 0.3 * off[0] + 1e-3, "{law:?}, nu {nu}: {off:?}");
+        }
+    }
+}
+
+/// Cells that the beam fills in part are nearly as accurate as full ones, with points that have the
+/// material's moments. With fractions of the whole cell they are not.
+#[test]
+fn boundary_cells_converge_too() {
+    for nu in [0.3, 0.45, 0.499] {
+        for cell in [2.6e-3, 2.1e-3, 1.7e-3, 1.3e-3, 1.1e-3] {
+            // The clamped side lies in a plane of the grid, the others do not.
+            let origin = Some(DVec3::new(0.0, -0.35, -0.6) * cell);
+            let of = |rule| error(Law::Corotated, nu, LatticeOptions { origin, rule, ..LatticeOptions::new(cell) });
+            let (moments, fraction) = (of(BoundaryRule::Moments), of(BoundaryRule::Fraction));
+            println!("nu {nu}, {} mm: off by {moments:.4}, with fractions {fraction:.4}", 1e3 * cell);
+            // As full cells of the same size: second order.
+            assert!(moments < 0.008 * (1e3 * cell).powi(2) && fraction > 4.0 * moments);
+        }
+    }
+}
