@@ -43,7 +43,7 @@ fn sag(
     let body = Body::new(BodyDescription { name: "organ".into(), lattice, material, pins, fixed: vec![] })?;
     let mut state = BodyState::new(&body);
     let begun = Instant::now();
-    let mut newton = Newton::new(&body, Precision { gradient: 1e-10, ..Precision::default() })?;
+    let mut newton = Newton::new(&body, Precision::default())?;
     newton.settle(&body, &Conditions::gravity(DVec3::Z * -9.81 * SHARE), &mut state)?;
     let moved = points.iter().zip(&mesh.vertices).map(|(point, p)| point.interpolate(&state.positions) - *p);
     Ok((moved.collect(), body, begun.elapsed().as_secs_f64()))

@@ -17,13 +17,18 @@ const ARMIJO: f64 = 1e-4;
 /// Greatest number of halvings of a step.
 const MAX_HALVINGS: usize = 40;
 
-/// Rounding of the energy, over the sum of the magnitudes of its parts.
+/// Rounding of the energy: over the energy, and over its geometric mean with Young's modulus times
+/// the volume. A strain e is off by the rounding of F, and its energy by e times that.
 const ENERGY_ROUNDING: f64 = 1e-13;
+const STRAIN_ROUNDING: f64 = 1e-15;
 
 /// Greatest number of iterations of conjugate gradients before the preconditioner is made again,
 /// and of those after it.
 const MAX_STALE_ITERATIONS: usize = 20;
 const MAX_FRESH_ITERATIONS: usize = 200;
+
+/// Greatest number of consecutive steps that lower neither the energy nor the gradient by a tenth.
+const MAX_STALLED_STEPS: usize = 5;
 
 /// Shifts of the diagonal that are tried, over its mean, if the projected matrix is singular.
 const SHIFTS: [f64; 5] = [0.0, 1e-10, 1e-8, 1e-6, 1e-4];
@@ -158,6 +163,7 @@ impl Newton {
         let mut solution = Solution { gradient: norm(&value), ..Solution::default() };
         let mut step = vec![DVec3::ZERO; x.len()];
         let mut project_next = false;
+        let mut stalled = 0;
         while solution.gradient.is_nan() || solution.gradient > tolerance {
             if !(value.energy.is_finite() && solution.gradient.is_finite()) {
                 return Err(Failure::NotFinite);
@@ -171,6 +177,12 @@ impl Newton {
             solution.projected += usize::from(projected);
             match search(potential, x, &step, &value) {
                 Some((next, share)) => {
+                    // Steps that keep the energy and most of the gradient are rounding.
+                    let same = next.energy >= value.energy && norm(&next) > 0.9 * solution.gradient;
+                    stalled = if same { stalled + 1 } else { 0 };
+                    if stalled == MAX_STALLED_STEPS {
+                        return Err(Failure::Stuck { gradient: solution.gradient, tolerance });
+                    }
                     // Where full steps fail, the exact curvature misleads.
                     project_next = !projected && share < 0.25;
                     value = next;
@@ -250,7 +262,8 @@ impl Newton {
 /// and the share of the step.
 fn search(potential: &Potential<'_>, x: &mut [DVec3], step: &[DVec3], value: &Value) -> Option<(Value, f64)> {
     let slope = dot(step, &value.gradient);
-    let rounding = ENERGY_ROUNDING * (value.energy.abs() + slope.abs());
+    let energy = value.energy.abs() + slope.abs();
+    let rounding = ENERGY_ROUNDING * energy + STRAIN_ROUNDING * (energy * potential.stiff_energy()).sqrt();
     let mut share = 1.0;
     for _ in 0..MAX_HALVINGS {
         let next: Vec<DVec3> = x.iter().zip(step).map(|(x, d)| *x + share * *d).collect();

@@ -39,6 +39,11 @@ impl<'a> Potential<'a> {
         self.motion.as_ref().map(|(_, y)| &y[..])
     }
 
+    /// Young's modulus times the volume (J).
+    pub fn stiff_energy(&self) -> f64 {
+        self.body.material().young_modulus * self.body.lattice().volume()
+    }
+
     fn springs(&self) -> impl Iterator<Item = &Spring> {
         self.body.pins().iter().chain(self.conditions.springs)
     }
