@@ -1,8 +1,8 @@
 //! The judge: Newton's method to convergence, in double precision.
 //!
-//! Each step solves the exact second derivative by conjugate gradients. Their preconditioner is a
-//! Cholesky factor of a projected second derivative, kept while it serves. Where the exact one is
-//! indefinite, the projected one is solved instead (Teran and others, "Robust quasistatic finite
+//! Each step solves the exact second derivative by conjugate gradients. Their preconditioner is the
+//! Cholesky factor of an earlier one, kept while it serves. Where the exact one is indefinite, the
+//! projected one is solved instead (Teran and others, "Robust quasistatic finite
 //! elements and flesh simulation", 2005).
 
 use crate::pcg::{Ended, Preconditioner, dot, solve};
@@ -22,10 +22,13 @@ const MAX_HALVINGS: usize = 40;
 const ENERGY_ROUNDING: f64 = 1e-13;
 const STRAIN_ROUNDING: f64 = 1e-15;
 
-/// Greatest number of iterations of conjugate gradients before the preconditioner is made again,
-/// and of those after it.
-const MAX_STALE_ITERATIONS: usize = 20;
-const MAX_FRESH_ITERATIONS: usize = 200;
+/// Greatest number of iterations of conjugate gradients before the factor is made again, and after.
+/// A factor costs as much as some six iterations.
+const MAX_STALE_ITERATIONS: usize = 6;
+const MAX_FRESH_ITERATIONS: usize = 50;
+
+/// Residual of a linear solve over the gradient.
+const LINEAR_TOLERANCE: f64 = 1e-4;
 
 /// Greatest number of consecutive steps that lower neither the energy nor the gradient by a tenth.
 const MAX_STALLED_STEPS: usize = 5;
@@ -206,41 +209,42 @@ impl Newton {
         solution: &mut Solution,
     ) -> Result<bool, Failure> {
         let down: Vec<DVec3> = value.gradient.iter().map(|g| -*g).collect();
-        // An error of a ten-thousandth costs few iterations and hardly slows convergence.
-        let tolerance = 1e-4;
         if !project {
-            let mut tries = vec![MAX_FRESH_ITERATIONS];
+            potential.hessian(x, false, &mut self.matrix);
+            let mut ended = Ended::Slow;
             if self.factorised {
-                tries.insert(0, MAX_STALE_ITERATIONS);
+                ended = self.solve(&down, MAX_STALE_ITERATIONS, step, solution);
             }
-            for (i, most) in tries.iter().enumerate() {
-                if !self.factorised || i > 0 {
-                    self.factorise(potential, x, solution)?;
-                }
-                potential.hessian(x, false, &mut self.matrix);
-                match solve(&self.matrix, &mut self.preconditioner, &down, tolerance, *most, step) {
-                    Ended::Solved(iterations) => {
-                        solution.linear_iterations += iterations;
-                        if dot(step, &value.gradient) < 0.0 {
-                            return Ok(false);
-                        }
-                        break;
-                    }
-                    Ended::Slow => solution.linear_iterations += most,
-                    Ended::NegativeCurvature => break,
+            if ended == Ended::Slow {
+                solution.factorisations += 1;
+                self.factorised = self.preconditioner.factorise(&self.matrix);
+                if self.factorised {
+                    ended = self.solve(&down, MAX_FRESH_ITERATIONS, step, solution);
                 }
             }
+            if ended == Ended::Solved && dot(step, &value.gradient) < 0.0 {
+                return Ok(false);
+            }
         }
-        self.factorise(potential, x, solution)?;
-        match solve(&self.matrix, &mut self.preconditioner, &down, tolerance, MAX_FRESH_ITERATIONS, step) {
-            Ended::Solved(iterations) => solution.linear_iterations += iterations,
-            Ended::Slow | Ended::NegativeCurvature => {}
-        }
+        self.factorise_projected(potential, x, solution)?;
+        self.solve(&down, MAX_FRESH_ITERATIONS, step, solution);
         if dot(step, &value.gradient) < 0.0 { Ok(true) } else { Err(Failure::Singular) }
     }
 
+    /// Solves the matrix for a step.
+    fn solve(&mut self, down: &[DVec3], most: usize, step: &mut [DVec3], solution: &mut Solution) -> Ended {
+        let (ended, iterations) = solve(&self.matrix, &mut self.preconditioner, down, LINEAR_TOLERANCE, most, step);
+        solution.linear_iterations += iterations;
+        ended
+    }
+
     /// Writes the projected second derivative at `x` into the matrix and factorises it.
-    fn factorise(&mut self, potential: &Potential<'_>, x: &[DVec3], solution: &mut Solution) -> Result<(), Failure> {
+    fn factorise_projected(
+        &mut self,
+        potential: &Potential<'_>,
+        x: &[DVec3],
+        solution: &mut Solution,
+    ) -> Result<(), Failure> {
         potential.hessian(x, true, &mut self.matrix);
         let count = self.matrix.len();
         let mean = (0..count).map(|i| trace(&self.matrix, i)).sum::<f64>() / (3 * count) as f64;

@@ -6,8 +6,8 @@ use trocar_sparse::{BlockMatrix, Cholesky, Level};
 /// How a solve ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Ended {
-    /// The residual is small enough, after so many iterations.
-    Solved(usize),
+    /// The residual is small enough.
+    Solved,
     /// The greatest number of iterations.
     Slow,
     /// A direction along which the matrix is not positive.
@@ -42,7 +42,8 @@ impl Preconditioner {
     }
 }
 
-/// Solves A x = b for x, until the residual's norm is at most `tolerance` times that of b.
+/// Solves A x = b for x, until the residual's norm is at most `tolerance` times that of b. Returns
+/// how it ended and the number of iterations.
 pub(crate) fn solve(
     matrix: &BlockMatrix,
     preconditioner: &mut Preconditioner,
@@ -50,7 +51,7 @@ pub(crate) fn solve(
     tolerance: f64,
     most: usize,
     x: &mut [DVec3],
-) -> Ended {
+) -> (Ended, usize) {
     x.fill(DVec3::ZERO);
     let mut residual = b.to_vec();
     let mut z = vec![DVec3::ZERO; b.len()];
@@ -63,7 +64,7 @@ pub(crate) fn solve(
         multiply(matrix, &direction, &mut product);
         let curvature = dot(&direction, &product);
         if curvature.is_nan() || curvature <= 0.0 {
-            return Ended::NegativeCurvature;
+            return (Ended::NegativeCurvature, iteration);
         }
         let step = size / curvature;
         for i in 0..x.len() {
@@ -71,7 +72,7 @@ pub(crate) fn solve(
             residual[i] -= step * product[i];
         }
         if dot(&residual, &residual) <= wanted {
-            return Ended::Solved(iteration);
+            return (Ended::Solved, iteration);
         }
         preconditioner.apply(&residual, &mut z);
         let next = dot(&residual, &z);
@@ -81,7 +82,7 @@ pub(crate) fn solve(
             *d = *z + keep * *d;
         }
     }
-    Ended::Slow
+    (Ended::Slow, most)
 }
 
 /// A times x.
