@@ -1,8 +1,9 @@
 //! Sag of an organ in lattices of several cell sizes beside its sag by a reference.
 //!
-//! `cargo run --release -p trocar-lattice --example sag -- ORGAN.msh REFERENCE.txt` where
-//! `crates/lattice/examples/sag_reference.py ORGAN.msh REFERENCE.txt` made the reference: for each
-//! node of the organ whether it is pinned, and its displacement (m) under a thousandth of gravity.
+//! `cargo run --release -p trocar-lattice --example sag -- ORGAN.msh REFERENCE.txt [CELL_MM ...]`
+//! where `crates/lattice/examples/sag_reference.py ORGAN.msh REFERENCE.txt` made the reference: for
+//! each node of the organ whether it is pinned, and its displacement (m) under a thousandth of
+//! gravity.
 
 #![allow(clippy::print_stdout, reason = "an example that prints a table")]
 
@@ -43,7 +44,8 @@ fn sag(mesh: &TetMesh, reference: &[(bool, DVec3)], options: &LatticeOptions) ->
     let begun = Instant::now();
     let lattice = Lattice::of_mesh(mesh, options)?;
     let points = lattice.embed_nodes()?;
-    let pins = points.iter().zip(reference).filter(|(_, (pinned, _))| *pinned).map(|(point, _)| *point).collect();
+    let pinned: Vec<u32> = (0..points.len() as u32).filter(|i| reference[*i as usize].0).collect();
+    let pins = lattice.embed_held(&pinned)?;
     let material = Material { law: Law::Corotated, young_modulus: 12e3, poisson_ratio: 0.45, density: 1200.0 };
     let body = Body::new(BodyDescription { name: "organ".into(), lattice, material, pins, fixed: vec![] })?;
     let mut state = BodyState::new(&body);
@@ -57,7 +59,13 @@ fn sag(mesh: &TetMesh, reference: &[(bool, DVec3)], options: &LatticeOptions) ->
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().collect();
-    let [_, organ, path] = &arguments[..] else { return Err("usage: sag ORGAN.msh REFERENCE.txt".into()) };
+    let [_, organ, path, cells @ ..] = &arguments[..] else {
+        return Err("usage: sag ORGAN.msh REFERENCE.txt [CELL_MM ...]".into());
+    };
+    let mut cells = cells.iter().map(|cell| cell.parse()).collect::<Result<Vec<f64>, _>>()?;
+    if cells.is_empty() {
+        cells = vec![4.0, 3.0, 2.3, 1.5, 1.0];
+    }
     let mesh = read_msh(Path::new(organ))?;
     let reference = reference(Path::new(path))?;
     if reference.len() != mesh.vertices.len() {
@@ -75,7 +83,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     for rule in [BoundaryRule::Moments, BoundaryRule::Fraction] {
-        for cell in [4.0, 3.0, 2.3, 1.5, 1.0] {
+        for cell in &cells {
             let options = LatticeOptions { rule, ..LatticeOptions::new(1e-3 * cell) };
             let Sag { moved, body, seconds: [built, solved] } = sag(&mesh, &reference, &options)?;
             let error = 1.0 - mean(&moved) / mean(&exact);

@@ -67,11 +67,17 @@ impl Lattice {
         }
         let search = Search::new(self);
         let embed = |p: &DVec3| {
-            let own = search.nearest_tet(*p).map_or(&[][..], |tet| search.cells_of(tet));
-            let hex = self.nearest_cell(*p, own.iter().map(|(_, cell, hex)| (*cell, *hex)));
+            let hex = search.nearest_tet(*p).map(|tet| search.hexahedron(tet, *p));
             self.at(hex.unwrap_or(0), *p)
         };
         Ok(points.par_iter().map(embed).collect())
+    }
+
+    /// Embeds points (m) inside given elements.
+    pub(crate) fn embed_in(&self, points: &[(u32, DVec3)]) -> Vec<EmbeddedPoint> {
+        let search = Search::new(self);
+        let embed = |(tet, p): &(u32, DVec3)| self.at(search.hexahedron(*tet, *p), *p);
+        points.par_iter().map(embed).collect()
     }
 
     /// The point `p` (m) of a hexahedron.
@@ -125,6 +131,12 @@ impl<'a> Search<'a> {
         let mut by_tet: Vec<_> = lattice.pieces.iter().map(|(cell, tet, hex)| (*tet, *cell, *hex)).collect();
         by_tet.sort_unstable();
         Self { lattice, cells, by_tet }
+    }
+
+    /// Of the hexahedra that a tetrahedron lies in, the one nearest to `p`.
+    fn hexahedron(&self, tet: u32, p: DVec3) -> u32 {
+        let own = self.cells_of(tet).iter().map(|(_, cell, hex)| (*cell, *hex));
+        self.lattice.nearest_cell(p, own).unwrap_or(0)
     }
 
     /// The pieces of a tetrahedron.

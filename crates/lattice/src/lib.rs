@@ -50,6 +50,7 @@ mod element;
 mod embedding;
 mod error;
 mod grid;
+mod held;
 mod lattice;
 mod material;
 mod moments;

@@ -142,6 +142,28 @@ fn fingers_that_nearly_touch_share_no_nodes() {
     assert_eq!(whole.doubled_cells(), 0);
 }
 
+/// Held nodes hold what lies between them: of a whole block points fill it evenly.
+#[test]
+fn held_nodes_fill_their_elements() {
+    let mesh = block([2, 2, 2], 3e-3);
+    let lattice = Lattice::of_mesh(&mesh, &LatticeOptions::new(1.7e-3)).unwrap();
+    let rest = |points: &[trocar_lattice::EmbeddedPoint]| -> Vec<DVec3> {
+        points.iter().map(|point| point.interpolate(lattice.nodes())).collect()
+    };
+    let side: Vec<u32> = (0..27).filter(|i| mesh.vertices[*i as usize].z < 1e-9).collect();
+    let points = rest(&lattice.embed_held(&side).unwrap());
+    assert!(points.len() > 80 && points.iter().all(|p| p.z.abs() < 1e-12));
+    let all: Vec<u32> = (0..27).collect();
+    let points = rest(&lattice.embed_held(&all).unwrap());
+    for k in 0..200 {
+        let at = 6e-3 * DVec3::new(noise(k), noise(300 + k), noise(600 + k));
+        let nearest = points.iter().map(|p| p.distance(at)).fold(f64::INFINITY, f64::min);
+        assert!(nearest < 1.7e-3 / 2.0, "{at}: {nearest}");
+    }
+    assert!(lattice.embed_held(&[3]).unwrap().len() == 1);
+    assert!(lattice.embed_held(&[27]).unwrap_err().to_string().contains("node 27"));
+}
+
 /// The body's pieces are connected as the body is: no cell is doubled where nothing is split.
 #[test]
 fn the_lattice_of_a_connected_body_is_connected() {
