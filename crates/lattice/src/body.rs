@@ -16,8 +16,9 @@ pub struct BodyDescription {
     pub lattice: Lattice,
     /// Material.
     pub material: Material,
-    /// Points that stay where they rest. Each is held by a spring of 100 times Young's modulus
-    /// times the edge of a cell.
+    /// Points that stay where they rest, as [`Lattice::embed_held`] makes of nodes of the mesh.
+    /// Each is held by a spring of 100 times Young's modulus times the edge of a cell. A cell of
+    /// which a part of the volume is held is held as a whole: a held end grows by up to a cell.
     pub pins: Vec<EmbeddedPoint>,
     /// Nodes of the lattice that never move.
     pub fixed: Vec<u32>,

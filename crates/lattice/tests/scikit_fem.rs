@@ -24,17 +24,31 @@ fn reference(heading: &str) -> Vec<(DVec3, DVec3)> {
 
 /// Mean distance from the linear reference over the mean displacement.
 fn error(law: Law, nu: f64, options: LatticeOptions) -> f64 {
-    off(law, nu, options, 1e-3, &reference(&format!("nu {nu}")))
+    off(law, nu, options, 1e-3, &reference(&format!("nu {nu}")), Clamp::Nodes)
+}
+
+/// What holds the side at x = 0.
+#[derive(Clone, Copy)]
+enum Clamp {
+    /// Fixed nodes of the lattice.
+    Nodes,
+    /// Pins at the side.
+    Pins,
 }
 
 /// Mean distance from `reference` over the mean displacement, under a share of gravity.
-fn off(law: Law, nu: f64, options: LatticeOptions, share: f64, reference: &[(DVec3, DVec3)]) -> f64 {
+fn off(law: Law, nu: f64, options: LatticeOptions, share: f64, reference: &[(DVec3, DVec3)], clamp: Clamp) -> f64 {
     // The lattice is cut from this mesh; it does not matter how fine that is.
     let mesh = block([12, 4, 3], 2e-3);
     let lattice = Lattice::of_mesh(&mesh, &options).unwrap();
-    let fixed = (0..lattice.nodes().len() as u32).filter(|i| lattice.nodes()[*i as usize].x < 1e-9).collect();
+    let clamped =
+        |points: &[DVec3]| -> Vec<u32> { (0..points.len() as u32).filter(|i| points[*i as usize].x < 1e-9).collect() };
+    let (fixed, pins) = match clamp {
+        Clamp::Nodes => (clamped(lattice.nodes()), vec![]),
+        Clamp::Pins => (vec![], lattice.embed_held(&clamped(&mesh.vertices)).unwrap()),
+    };
     let material = Material { law, young_modulus: 12e3, poisson_ratio: nu, density: 1200.0 };
-    let body = Body::new(BodyDescription { name: "beam".into(), lattice, material, pins: vec![], fixed }).unwrap();
+    let body = Body::new(BodyDescription { name: "beam".into(), lattice, material, pins, fixed }).unwrap();
     let mut state = BodyState::new(&body);
     let mut newton = Newton::new(&body, Precision::default()).unwrap();
     newton.settle(&body, &Conditions::gravity(DVec3::Z * -9.81 * share), &mut state).unwrap();
@@ -83,8 +97,22 @@ fn boundary_cells_converge_too() {
 fn bent_beams_converge_to_quadratic_tetrahedra() {
     for law in Law::ALL {
         let reference = reference(&format!("bent {law:?}"));
-        let off = [2e-3, 1e-3].map(|cell| off(law, 0.45, LatticeOptions::new(cell), 1.0, &reference));
+        let off = [2e-3, 1e-3].map(|cell| off(law, 0.45, LatticeOptions::new(cell), 1.0, &reference, Clamp::Nodes));
         println!("{law:?}: off by {off:.4?}");
         assert!(off[0] < 0.035 && off[1] < 0.3 * off[0] + 3e-3, "{law:?}: {off:?}");
+    }
+}
+
+/// Pins clamp the beam as fixed nodes do, also in the middle of cells.
+#[test]
+fn pins_clamp_as_fixed_nodes() {
+    for cell in [2.1e-3, 1.1e-3] {
+        for offset in [0.0, 0.3, 0.5, 0.8] {
+            let options =
+                LatticeOptions { origin: Some(DVec3::new(-offset, -0.35, -0.6) * cell), ..LatticeOptions::new(cell) };
+            let pinned = off(Law::Corotated, 0.45, options, 1e-3, &reference("nu 0.45"), Clamp::Pins);
+            println!("{} mm, the side at {offset} of a cell: off by {pinned:.4}", 1e3 * cell);
+            assert!(pinned < 0.008 * (1e3 * cell).powi(2), "{cell}, {offset}: {pinned}");
+        }
     }
 }
