@@ -103,7 +103,7 @@ fn bent_beams_converge_to_quadratic_tetrahedra() {
     }
 }
 
-/// Pins clamp the beam as fixed nodes do, also in the middle of cells.
+/// Pins clamp a side along the grid as fixed nodes do, also in the middle of cells.
 #[test]
 fn pins_clamp_as_fixed_nodes() {
     for cell in [2.1e-3, 1.1e-3] {
