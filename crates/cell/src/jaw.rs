@@ -43,7 +43,9 @@ pub struct Jaw {
     max_angle: f64,
     /// Fastest motion (rad a frame).
     fastest: f64,
-    /// Stiffness seen so far: opening force per closing angle (N/rad).
+    /// The direction in which it pressed last: -1 closed it, 1 opened it.
+    direction: f64,
+    /// Stiffness seen so far in that direction: opening force per closing angle (N/rad).
     stiffness: f64,
     /// Angle (rad) and opening force (N) a frame ago.
     last: Option<(f64, f64)>,
@@ -59,7 +61,14 @@ impl Jaw {
     /// A jaw that presses with `budget` (N), opens to `max_angle` (rad) and closes in
     /// `closing_time` (s).
     pub fn sized(budget: f64, max_angle: f64, closing_time: f64) -> Self {
-        Self { budget, max_angle, fastest: max_angle * FRAME / closing_time, stiffness: 0.0, last: None }
+        Self {
+            budget,
+            max_angle,
+            fastest: max_angle * FRAME / closing_time,
+            direction: -1.0,
+            stiffness: 0.0,
+            last: None,
+        }
     }
 
     /// The angle (rad) at the end of the next frame, for a jaw at `angle` that tissue pushes open
@@ -75,15 +84,15 @@ impl Jaw {
 
     /// The same for a jaw that opens to `target` (rad).
     pub fn open(&mut self, angle: f64, target: f64, force: f64) -> f64 {
-        if force >= 0.0 {
-            return self.turn_to(angle, target);
-        }
         self.press(angle, force, 1.0, self.opening_force()).min(target)
     }
 
     /// The angle (rad) after a frame in which the jaw presses with `budget` (N) in one `direction`: -1
     /// closes it, 1 opens it.
     fn press(&mut self, angle: f64, force: f64, direction: f64, budget: f64) -> f64 {
+        if self.direction != direction {
+            (self.direction, self.stiffness, self.last) = (direction, 0.0, None);
+        }
         self.stiffness *= FORGETTING;
         if let Some((then, was)) = self.last
             && (then - angle).abs() > LEAST_MOTION
@@ -102,16 +111,14 @@ impl Jaw {
 
     /// The numbers of its state.
     pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
-        let Self { budget, max_angle: _, fastest: _, stiffness, last } = *self;
+        let Self { budget, max_angle: _, fastest: _, direction, stiffness, last } = *self;
         let (angle, force) = last.unwrap_or((-1.0, 0.0));
-        [budget, stiffness, angle, force].into_iter()
+        [budget, direction, stiffness, angle, force].into_iter()
     }
 
-    /// The angle (rad) at the end of the next frame on the way to `target` at full speed.
-    pub fn turn_to(&mut self, angle: f64, target: f64) -> f64 {
-        self.last = None;
-        self.stiffness = 0.0;
-        angle + (target - angle).clamp(-self.fastest, self.fastest)
+    /// Forgets what it met.
+    pub fn rest(&mut self) {
+        (self.direction, self.stiffness, self.last) = (-1.0, 0.0, None);
     }
 }
 
