@@ -66,7 +66,13 @@ impl Contact {
     /// Force along the normal at a `depth` (m) behind the plane (N).
     #[inline(always)]
     pub fn pressure(&self, depth: f32) -> f32 {
-        self.stiffness * (depth.max(0.0) + (HARDENING - 1.0) * (depth - self.hard_from).max(0.0))
+        self.stiffness * self.linear_depth(depth)
+    }
+
+    /// The depth at which a spring that never hardens would have the same force (m).
+    #[inline(always)]
+    fn linear_depth(&self, depth: f32) -> f32 {
+        depth.max(0.0) + (HARDENING - 1.0) * (depth - self.hard_from).max(0.0)
     }
 
     /// Stiffness along the normal of a point at `x` (N/m).
@@ -79,7 +85,7 @@ impl Contact {
     #[inline(always)]
     pub fn limit(&self, x: Vec3A) -> f32 {
         match self.friction {
-            Friction::Coulomb(coefficient) => coefficient * self.pressure(-self.height(x)),
+            Friction::Coulomb(coefficient) => coefficient * self.stiffness * self.linear_depth(-self.height(x)),
             // NaN is no force.
             Friction::Clamped(force) => force.max(0.0),
         }
