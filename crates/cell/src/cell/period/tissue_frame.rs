@@ -24,10 +24,10 @@ impl Cell {
     /// Sets the motions of the tools for a frame of tissue.
     pub(super) fn begin_tissue_frame(&mut self) -> FrameStart {
         self.motions.clear();
-        for k in 0..self.arms.len() {
-            let wanted = self.arms[k].next_angle();
-            let angle = self.solids.turn_jaws(&self.arms, k, wanted);
-            self.motions.extend(self.arms[k].motions(angle, FRAME));
+        for arm in &mut self.arms {
+            let wanted = arm.next_angle();
+            let angle = self.solids.turn_jaws(arm, wanted);
+            self.motions.extend(arm.motions(angle, FRAME));
         }
         let newly_attached = self.arms.iter().any(|arm| arm.is_newly_attached(&self.world));
         FrameStart { state: newly_attached.then(|| self.world.state.clone()), clock: Instant::now() }

@@ -6,9 +6,8 @@
 //! not enough, because the pressure remains. So the guard does two things:
 //!
 //! - Commands, 30 times a second: the part of a motion against the load becomes shorter as the load
-//!   nears the limit; beyond the limit the instrument retracts, and goes less far aside, because
-//!   what slides along tissue under a high load is pressed into it where it curves. The motion is
-//!   measured from the arm's reference, because commands are up to 20 mm ahead of a fast arm.
+//!   nears the limit; beyond the limit the instrument retracts. The motion is measured from the
+//!   arm's reference, because commands are up to 20 mm ahead of a fast arm.
 //! - Stops, 60 times a second: an arm that would pass the limit before the next chance to stop it
 //!   stops at once, and so does one that is about to hit tissue fast ([`super::approach`]).
 //!
@@ -33,9 +32,6 @@ const DEADBAND: f64 = 0.02;
 
 /// Minimum and maximum assumed stiffness of tissue (N/m).
 const STIFFNESS: [f64; 2] = [2e3, 5e4];
-
-/// Beyond this multiple of the limit the instrument goes no way but back.
-const STILL_FROM: f64 = 1.5;
 
 /// Decay of the stiffness from one tissue frame to the next.
 const FORGETTING: f64 = 0.99;
@@ -144,12 +140,7 @@ impl ForceGuard {
         }
         let against = -way.dot(out);
         let allowed = against.min(most);
-        let still = ((size / limit - 1.0) / (STILL_FROM - 1.0)).clamp(0.0, 1.0);
-        if allowed == against && still == 0.0 {
-            return way;
-        }
-        let aside = way + against * out;
-        (1.0 - still) * aside - allowed * out
+        if allowed == against { way } else { way + (against - allowed) * out }
     }
 
     /// Whether the tissue at the instrument soon is strained beyond the guard's limits.

@@ -1,11 +1,11 @@
-//! Jaws that turn until solids push their blades back with the jaw's force.
+//! Jaws that turn until the bed or pinned tissue pushes their blades back with the scene's force
+//! limit, as ideal arms move. Another instrument yields instead: it is pushed away.
 //!
 //! Blades turn once a frame of tissue, by up to 1.4 mm at their tips, nearly their radius. Springs in
 //! the arms' steps would come too late for that.
 
 use super::Solids;
 use super::meeting::Meeting;
-use super::pair::meetings;
 use super::rod::Rod;
 use super::spring::Spring;
 use crate::Gripper;
@@ -20,23 +20,21 @@ const BISECTIONS: usize = 8;
 const MAX_TURN: f64 = 0.035;
 
 impl Solids {
-    /// The angle to which the jaws of arm `k` turn in this frame on their way to `wanted` (rad):
-    /// less far if solids would push back with more than the jaw's force, and with more than where
-    /// the jaws are.
-    pub fn turn_jaws(&self, arms: &[ArmUnit], k: usize, wanted: f64) -> f64 {
-        let angle = arms[k].state.gripper.jaw_angle;
+    /// The angle to which the jaws of `arm` turn in this frame on their way to `wanted` (rad):
+    /// less far if solids would push back with more than the force limit, and with more than where the
+    /// jaws are.
+    pub fn turn_jaws(&self, arm: &ArmUnit, wanted: f64) -> f64 {
+        let angle = arm.state.gripper.jaw_angle;
         if wanted == angle {
             return wanted;
         }
         let direction = (wanted - angle).signum();
-        let crossed = self.blades_cross(&arms[k], angle);
-        let against = |at: f64| match !crossed && self.blades_cross(&arms[k], at) {
+        let crossed = self.blades_cross(arm, angle);
+        let against = |at: f64| match !crossed && self.blades_cross(arm, at) {
             true => f64::INFINITY,
-            false => -direction * self.opening_force(arms, k, at),
+            false => -direction * self.opening_force(arm, at),
         };
-        let jaw = arms[k].state.jaw;
-        let most = if direction > 0.0 { jaw.opening_force() } else { jaw.budget };
-        let allowed = most.max(against(angle));
+        let allowed = arm.model.stop_force.max(against(angle));
         let steps = ((wanted - angle).abs() / MAX_TURN).ceil();
         let mut reached = angle;
         for step in 1..=steps as usize {
@@ -63,10 +61,9 @@ impl Solids {
         self.pinned.is_crossed(&blades)
     }
 
-    /// Force with which solids push the blades of arm `k` apart with the jaws at `angle` (N): the
+    /// Force with which solids push the blades of `arm` apart with the jaws at `angle` (N): the
     /// mean over both blades of the outward force, as that of tissue.
-    fn opening_force(&self, arms: &[ArmUnit], k: usize, angle: f64) -> f64 {
-        let arm = &arms[k];
+    fn opening_force(&self, arm: &ArmUnit, angle: f64) -> f64 {
         let gripper = Gripper { pose: arm.drive.tip(), jaw_angle: angle };
         let rods = arm.rods_of(&gripper);
         let mut sum = 0.0;
@@ -75,9 +72,6 @@ impl Solids {
             let blade: Vec<Rod> = rods.iter().filter(|rod| rod.part == part).copied().collect();
             let push = |m: Meeting| Spring::at(m.gap, m.room).force() * m.normal.dot(outwards);
             sum += self.still(arm, &blade).into_iter().map(push).sum::<f64>();
-            for (_, other) in arms.iter().enumerate().filter(|(j, _)| *j != k) {
-                sum += meetings(&blade, &other.rods_at(other.drive.tip())).map(push).sum::<f64>();
-            }
         }
         0.5 * sum
     }
