@@ -1,4 +1,5 @@
 //! The jaw's drive: it closes until tissue pushes back with the force budget, and holds that force.
+//! It opens with a small force: that of a handle's spring.
 //!
 //! A drive that is commanded by angle crushes soft tissue or loses it. This one is commanded by
 //! force. It closes at a limited speed that falls as the force nears the budget, and opens when it
@@ -13,6 +14,9 @@ use crate::gripper::MAX_ANGLE;
 /// with friction 0.6 then hold 0.6 N, and a lift of 15 mm needs 0.2 to 0.4 N. See
 /// `docs/measurements/grasp.md`.
 pub const JAW_FORCE: f64 = 0.5;
+
+/// Largest force with which jaws open against tissue or solids (N), if they have it.
+const OPENING_FORCE: f64 = 1.0;
 
 /// Time from wide open to closed, without tissue (s).
 const CLOSING_TIME: f64 = 0.3;
@@ -39,7 +43,9 @@ pub struct Jaw {
     max_angle: f64,
     /// Fastest motion (rad a frame).
     fastest: f64,
-    /// Stiffness seen so far: opening force per closing angle (N/rad).
+    /// The direction in which it pressed last: -1 closed it, 1 opened it.
+    direction: f64,
+    /// Stiffness seen so far in that direction: opening force per closing angle (N/rad).
     stiffness: f64,
     /// Angle (rad) and opening force (N) a frame ago.
     last: Option<(f64, f64)>,
@@ -55,12 +61,38 @@ impl Jaw {
     /// A jaw that presses with `budget` (N), opens to `max_angle` (rad) and closes in
     /// `closing_time` (s).
     pub fn sized(budget: f64, max_angle: f64, closing_time: f64) -> Self {
-        Self { budget, max_angle, fastest: max_angle * FRAME / closing_time, stiffness: 0.0, last: None }
+        Self {
+            budget,
+            max_angle,
+            fastest: max_angle * FRAME / closing_time,
+            direction: -1.0,
+            stiffness: 0.0,
+            last: None,
+        }
     }
 
     /// The angle (rad) at the end of the next frame, for a jaw at `angle` that tissue pushes open
     /// with `force` (N). 0 to the widest.
     pub fn squeeze(&mut self, angle: f64, force: f64) -> f64 {
+        self.press(angle, force, -1.0, self.budget)
+    }
+
+    /// Largest force with which the jaw opens (N).
+    pub fn opening_force(&self) -> f64 {
+        self.budget.min(OPENING_FORCE)
+    }
+
+    /// The same for a jaw that opens to `target` (rad).
+    pub fn open(&mut self, angle: f64, target: f64, force: f64) -> f64 {
+        self.press(angle, force, 1.0, self.opening_force()).min(target)
+    }
+
+    /// The angle (rad) after a frame in which the jaw presses with `budget` (N) in one `direction`: -1
+    /// closes it, 1 opens it.
+    fn press(&mut self, angle: f64, force: f64, direction: f64, budget: f64) -> f64 {
+        if self.direction != direction {
+            (self.direction, self.stiffness, self.last) = (direction, 0.0, None);
+        }
         self.stiffness *= FORGETTING;
         if let Some((then, was)) = self.last
             && (then - angle).abs() > LEAST_MOTION
@@ -68,27 +100,25 @@ impl Jaw {
             self.stiffness = self.stiffness.max((force - was) / (then - angle));
         }
         self.last = Some((angle, force));
-        let missing = self.budget - force;
-        if missing.abs() <= DEADBAND * self.budget {
+        let missing = budget + direction * force;
+        if missing.abs() <= DEADBAND * budget {
             return angle;
         }
-        let fastest = self.fastest * (missing.abs() / self.budget).min(1.0);
+        let fastest = self.fastest * (missing.abs() / budget).min(1.0);
         let step = if self.stiffness > 0.0 { (GAIN * missing.abs() / self.stiffness).min(fastest) } else { fastest };
-        (angle - step.copysign(missing)).clamp(0.0, self.max_angle)
+        (angle + direction * step.copysign(missing)).clamp(0.0, self.max_angle)
     }
 
     /// The numbers of its state.
     pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
-        let Self { budget, max_angle: _, fastest: _, stiffness, last } = *self;
+        let Self { budget, max_angle: _, fastest: _, direction, stiffness, last } = *self;
         let (angle, force) = last.unwrap_or((-1.0, 0.0));
-        [budget, stiffness, angle, force].into_iter()
+        [budget, direction, stiffness, angle, force].into_iter()
     }
 
-    /// The angle (rad) at the end of the next frame on the way to `target` at full speed.
-    pub fn turn_to(&mut self, angle: f64, target: f64) -> f64 {
-        self.last = None;
-        self.stiffness = 0.0;
-        angle + (target - angle).clamp(-self.fastest, self.fastest)
+    /// Forgets what it met.
+    pub fn rest(&mut self) {
+        (self.direction, self.stiffness, self.last) = (-1.0, 0.0, None);
     }
 }
 
@@ -134,6 +164,20 @@ mod tests {
         let (_, forces) = close_on(|a, turn| if a < 0.8 { creeping(a, turn) } else { 0.0 }, 1.0);
         assert!(forces.iter().all(|f| *f < 1.3), "{forces:?}");
         assert!(forces[70..].iter().all(|f| (f - 1.0).abs() < 0.05), "{forces:?}");
+    }
+
+    #[test]
+    fn it_opens_with_no_more_than_the_budget() {
+        // Tissue of some stiffness (N/rad) around the blades from 0.3 rad on.
+        for stiffness in [1.0, 5.0, 50.0, 1e3] {
+            let (mut jaw, mut angle, mut force) = (Jaw::new(0.5), 0.0, 0.0);
+            for _ in 0..90 {
+                angle = jaw.open(angle, 0.9, force);
+                force = -stiffness * (angle - 0.3).max(0.0);
+            }
+            let reached = (stiffness * 0.6).min(0.5);
+            assert!((-force - reached).abs() < 0.025 && angle <= 0.9, "{stiffness}: {force} N at {angle} rad");
+        }
     }
 
     #[test]

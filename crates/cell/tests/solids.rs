@@ -3,12 +3,12 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 #![allow(clippy::print_stdout, reason = "what was measured, for those who ask with --nocapture")]
 
-use glam::DVec3;
+use glam::{DMat3, DQuat, DVec3};
 use trocar_cell::{Action, Cell, CellEvent, CellReport, Setpoint};
 use trocar_core::Pose;
 use trocar_scene::{Arm, Drive, Scene, Side};
 use trocar_specimen::{Pins, Specimen};
-use trocar_testing::tube::{ONE_END, meshed, scene, two_tubes};
+use trocar_testing::tube::{ONE_END, RADIUS, meshed, scene, two_tubes};
 
 /// The coarse tubes, 25 mm behind where instruments cross in these tests.
 fn aside() -> (Scene, Specimen) {
@@ -244,4 +244,35 @@ fn tissue_that_cannot_move_stops_instruments_at_its_surface() {
         assert_eq!(arm.contact, DVec3::ZERO, "{name}: what cannot move has no contact of tissue");
         assert!(rcm < 1e-3, "{name}: {rcm} m");
     }
+}
+
+#[test]
+fn jaws_open_until_solids_hold_them() {
+    let mut scene = scene();
+    scene.task.organ = "tube".to_owned();
+    let fixed = meshed(Pins::Band { share: 1.0 }, 2.2e-3);
+    let mut cell = Cell::new(&scene, &fixed, 1).unwrap();
+    // Closed blades beside the tube, 0.8 mm from it, which open towards it and away from it.
+    let place = |height: f64| DVec3::new(0.0, 0.46 + RADIUS + 4e-3, TUBE_TOP - RADIUS + 0.0205 + height);
+    let rotation = DQuat::from_mat3(&DMat3::from_cols(-DVec3::Z, -DVec3::Y, -DVec3::X));
+    let mut targets: Vec<Setpoint> = cell.observe().iter().map(|a| a.commanded).collect();
+    let mut go = |cell: &mut Cell, height: f64, jaw: f64, periods: usize| -> Vec<CellReport> {
+        let pose = Pose { rotation, translation: place(height) };
+        targets[0] = cell.solve("left", &pose, &targets[0]).unwrap().setpoint.with_jaw(jaw);
+        (0..periods).map(|_| cell.step(&Action::targets(&targets)).unwrap()).collect()
+    };
+    go(&mut cell, 0.03, 0.0, 60);
+    let before = go(&mut cell, 0.0, 0.0, 60);
+    assert!(most(&before, |r| r.arms[0].solid_peak) == 0.0, "the closed jaws are free");
+    let opened = go(&mut cell, 0.0, 1.0, 45);
+    let last = &opened.last().unwrap().arms[0];
+    let peak = most(&opened, |r| r.arms[0].solid_peak);
+    println!("jaws open to {:.2} beside a solid; peak {peak:.2} N", last.measured.jaw());
+    assert!(last.measured.jaw() > 0.02 && last.measured.jaw() < 0.5, "{}", last.measured.jaw());
+    assert!(peak > 0.1 && peak < 3.0, "{peak} N");
+    // They close again, and in the open they open whole.
+    go(&mut cell, 0.0, 0.0, 20);
+    go(&mut cell, 0.03, 0.0, 45);
+    let free = go(&mut cell, 0.03, 1.0, 45);
+    assert!(free.last().unwrap().arms[0].measured.jaw() > 0.99);
 }

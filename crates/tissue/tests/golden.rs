@@ -202,7 +202,7 @@ fn struck_block() {
         vec![at(DVec3::new(2e-3, 0.0, -11e-3) * t), at(DVec3::new(8e-3, 0.0, -3e-3) * t)]
     };
     let found = hashes(&model, &state, 24, &tools, &[]);
-    check("struck block", found, [0xc17a9e311e19ab04, 0x1274898424fbf17c, 0x4faae1f8a7e5c994]);
+    check("struck block", found, [0x74decbad8bbe370e, 0x1274898424fbf17c, 0x4faae1f8a7e5c994]);
 }
 
 /// Elements pressed almost flat, thrown inwards and hit: it overstretches.
@@ -224,7 +224,7 @@ fn flat_elements() {
     }
     let tools = |k: usize| vec![at(DVec3::new(0.0, 0.0, -9e-3) * bump(k, 6))];
     let found = hashes(&model, &state, 12, &tools, &[]);
-    check("flat elements", found, [0x5739346637a2dae7, 0x7345bf12772cc00f, 0x1caa3dcc4c6d26f9]);
+    check("flat elements", found, [0xb930d0d371227786, 0xdc903f6431c8d73e, 0xa2b0a281ae86ac0f]);
 }
 
 /// A spring of negative stiffness: the matrix has no Cholesky factor, and sweeps take over in the
@@ -236,5 +236,5 @@ fn fallback_to_sweeps() {
         jaws.stiffness = -30.0;
     }
     let found = hashes(&model, &state, 12, &lift_and_probe, &[]);
-    check("fallback to sweeps", found, [0x510c20ae6003e4a8, 0x77f5de6435d096d2, 0xf99c2b40554a8313]);
+    check("fallback to sweeps", found, [0xda886b56dd2eb6b1, 0x77f5de6435d096d2, 0xf99c2b40554a8313]);
 }

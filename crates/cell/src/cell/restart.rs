@@ -32,7 +32,7 @@ impl Cell {
             let tool = arm.model.tools.gripper;
             self.world.state.grasps.retain(|g| g.tool != tool);
             let (mut jaw, mut scissors) = (arm.state.jaw, arm.state.scissors);
-            jaw.turn_to(0.0, 0.0);
+            jaw.rest();
             scissors.rest();
             let (pose, design) = (arm.drive.tip(), arm.state.design);
             arm.state = ArmState::new(pose, &arm.model, *start, design, jaw, scissors);

@@ -20,6 +20,15 @@ pub struct Collider {
 }
 
 impl Collider {
+    /// Depth from which its contacts are harder (m): half of that at which tissue would reach the
+    /// axis of a round shape, so that nothing passes it.
+    pub(crate) fn hard_from(&self) -> f32 {
+        match &self.shape {
+            Shape::Sphere { radius, .. } | Shape::Capsule { radius, .. } => (0.5 * (radius + self.rest_offset)) as f32,
+            Shape::HalfSpace { .. } | Shape::Box { .. } | Shape::Hull(_) => f32::INFINITY,
+        }
+    }
+
     /// Checks the collider.
     pub(crate) fn check(&self) -> Result<(), String> {
         self.shape.check()?;

@@ -37,6 +37,7 @@ impl CompliantNode {
             point: place,
             place,
             stiffness: compliance.stiffness as f32,
+            hard_from: f32::INFINITY,
             friction: Friction::Clamped(
                 (2.0 * compliance.friction * compliance.jaw_force / grasp.nodes.len() as f64) as f32,
             ),

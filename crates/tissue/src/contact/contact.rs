@@ -28,9 +28,14 @@ pub(crate) struct Contact {
     pub place: Vec3A,
     /// (N/m)
     pub stiffness: f32,
+    /// Depth from which the spring is harder (m); infinite if it never is.
+    pub hard_from: f32,
     /// Limit of friction.
     pub friction: Friction,
 }
+
+/// Stiffness of a contact that is deep over that of one that has just begun.
+const HARDENING: f32 = 25.0;
 
 /// The limit of friction.
 #[derive(Clone, Copy, Debug)]
@@ -58,11 +63,29 @@ impl Contact {
         (x - self.point).dot(self.normal)
     }
 
+    /// Force along the normal at a `depth` (m) behind the plane (N).
+    #[inline(always)]
+    pub fn pressure(&self, depth: f32) -> f32 {
+        self.stiffness * self.linear_depth(depth)
+    }
+
+    /// The depth at which a spring that never hardens would have the same force (m).
+    #[inline(always)]
+    fn linear_depth(&self, depth: f32) -> f32 {
+        depth.max(0.0) + (HARDENING - 1.0) * (depth - self.hard_from).max(0.0)
+    }
+
+    /// Stiffness along the normal of a point at `x` (N/m).
+    #[inline(always)]
+    pub fn tangent(&self, x: Vec3A) -> f32 {
+        if -self.height(x) > self.hard_from { HARDENING * self.stiffness } else { self.stiffness }
+    }
+
     /// Greatest friction force on a point at `x` (N).
     #[inline(always)]
     pub fn limit(&self, x: Vec3A) -> f32 {
         match self.friction {
-            Friction::Coulomb(coefficient) => coefficient * self.stiffness * (-self.height(x)).max(0.0),
+            Friction::Coulomb(coefficient) => coefficient * self.stiffness * self.linear_depth(-self.height(x)),
             // NaN is no force.
             Friction::Clamped(force) => force.max(0.0),
         }
@@ -83,11 +106,15 @@ impl Contact {
         if !pressed && limit <= 0.0 {
             return None;
         }
-        let (height, along) = if pressed { (height, self.stiffness) } else { (0.0, 0.0) };
+        let (force, along) = match self.friction {
+            Friction::Clamped(_) => (self.stiffness * height, self.stiffness),
+            Friction::Coulomb(_) if pressed => (-self.pressure(-height), self.tangent(x)),
+            Friction::Coulomb(_) => (0.0, 0.0),
+        };
         let off = self.off(x);
         let pull = self.stiffness * off.length();
         let across = self.stiffness * if pull > limit { limit / pull } else { 1.0 };
-        Some(Push { gradient: along * height * self.normal + across * off, along, across })
+        Some(Push { gradient: force * self.normal + across * off, along, across })
     }
 
     /// The same contact as one of a `vertex` of the site alone, which bears a `share` of it, while the
@@ -99,6 +126,7 @@ impl Contact {
             point: here - (self.height(at) / share) * self.normal,
             place: here - (at - self.place) / share,
             stiffness: self.stiffness * share * share,
+            hard_from: self.hard_from / share,
             ..*self
         }
     }

@@ -267,6 +267,10 @@ impl ContactSet {
                         point,
                         place: self.carried(source, body, place),
                         stiffness: factor * stiffness,
+                        hard_from: match source {
+                            Source::Collider(c) => frame.colliders[c as usize].hard_from(),
+                            _ => f32::INFINITY,
+                        },
                         friction: Friction::Coulomb(friction),
                     });
                     places.push(place);
@@ -432,7 +436,7 @@ impl ContactSet {
                 if let (Some(force), Some(Some(placed))) = (self.forces.get_mut(tool), self.placed.get(c as usize)) {
                     let arm = body.origin + here.as_dvec3() - placed.to.translation;
                     force.contact += Wrench::at(push.gradient.as_dvec3(), arm);
-                    force.pressing += f64::from(contact.stiffness * -contact.height(here));
+                    force.pressing += f64::from(contact.pressure(-contact.height(here)));
                     force.touching += usize::from(counted != Some((contact.site.first(), tool)));
                     counted = Some((contact.site.first(), tool));
                 }

@@ -172,6 +172,7 @@ impl FeatureContacts {
                     point,
                     place: local(p - known.map_or(Vec3A::ZERO, |anchor| anchor.stretch).as_dvec3()),
                     stiffness: stiffness(body, &site),
+                    hard_from: collider.hard_from(),
                     friction: Friction::Coulomb(if placed.grips { 0.0 } else { collider.friction as f32 }),
                 });
             }
@@ -205,7 +206,7 @@ impl FeatureContacts {
             if let Some(force) = forces.get_mut(frame.colliders[c as usize].tool) {
                 let arm = body.origin + here.as_dvec3() - placed.to.translation;
                 force.contact += Wrench::at(push.gradient.as_dvec3(), arm);
-                force.pressing += f64::from(contact.stiffness * -contact.height(here));
+                force.pressing += f64::from(contact.pressure(-contact.height(here)));
                 force.touching += 1;
             }
         }

@@ -141,6 +141,7 @@ impl Pairs {
                     place: Vec3A::ZERO,
                     // Two springs in a row, one in each body.
                     stiffness: 2.0 * contact.stiffness as f32 * ours * theirs / (ours + theirs),
+                    hard_from: f32::INFINITY,
                     friction: Friction::Coulomb(contact.friction as f32),
                 },
                 limit: 0.0,

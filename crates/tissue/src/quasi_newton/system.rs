@@ -130,18 +130,16 @@ impl System {
         pressing.fill(0.0);
         for contact in contacts.list().iter().filter(|contact| !matches!(contact.source, Source::Grasp(..))) {
             let number = |vertex: u32| layout.number[vertex as usize] as usize;
-            if contact.height(contact.site.at(|vertex| position(&x[number(vertex)]))) >= 0.0 {
+            let here = contact.site.at(|vertex| position(&x[number(vertex)]));
+            if contact.height(here) >= 0.0 {
                 continue;
             }
+            let stiffness = contact.tangent(here);
             for (vertex, share) in contact.site.shares() {
                 let i = number(vertex);
                 if i < layout.free && !held[i] {
                     // An edge or triangle, which comes after the vertices, adds to them.
-                    pressing[i] = if contact.site.is_vertex() {
-                        contact.stiffness
-                    } else {
-                        pressing[i] + share * contact.stiffness
-                    };
+                    pressing[i] = if contact.site.is_vertex() { stiffness } else { pressing[i] + share * stiffness };
                 }
             }
         }

@@ -34,8 +34,12 @@ impl ArmUnit {
 
     /// The same with the tip frame at `pose`.
     pub fn rods_at(&self, pose: Pose) -> Vec<Rod> {
-        let gripper = Gripper { pose, ..self.state.gripper };
-        let rods = self.frames_of(&gripper).into_iter().enumerate().flat_map(|(number, (tool, frame))| {
+        self.rods_of(&Gripper { pose, ..self.state.gripper })
+    }
+
+    /// The same for any place and angle of the jaws.
+    pub fn rods_of(&self, gripper: &Gripper) -> Vec<Rod> {
+        let rods = self.frames_of(gripper).into_iter().enumerate().flat_map(|(number, (tool, frame))| {
             let parts = self.model.parts.iter().filter(move |part| part.tool == tool);
             parts.filter_map(move |part| match part.shape {
                 Shape::Capsule { ends, radius } => {

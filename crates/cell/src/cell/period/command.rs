@@ -69,7 +69,7 @@ impl ArmUnit {
         let from = space.tip(&drive.reference()).translation;
         let mut tip = space.tip(&next);
         let way = tip.translation - from;
-        let allowed = state.guard.allow(way, model.force_limit);
+        let allowed = state.guard.allow(way, model.force_limit, model.period);
         state.guarded = allowed != way;
         if state.guarded {
             tip.translation = from + allowed;

@@ -1,23 +1,29 @@
 //! Stage 6: the force guard sees the load of the frame, and stops an arm that would pass its limit.
 
+use crate::World;
 use crate::cell::Cell;
 use crate::cell::arm::{ArmUnit, Wanted};
-use crate::cell::rules::TissueAtArm;
+use crate::cell::rules::{TissueAtArm, hit_ahead};
 
 impl Cell {
     /// `tissue`: the strain of the tissue at each arm.
     pub(super) fn stop_in_time(&mut self, tissue: &[TissueAtArm]) {
         for (arm, tissue) in self.arms.iter_mut().zip(tissue) {
-            arm.stop_in_time(*tissue);
+            arm.stop_in_time(&self.world, *tissue);
         }
     }
 }
 
 impl ArmUnit {
-    fn stop_in_time(&mut self, tissue: TissueAtArm) {
+    fn stop_in_time(&mut self, world: &World, tissue: TissueAtArm) {
+        let Self { model, state, .. } = self;
+        let forces = [state.exchange.force(), state.solid.force()];
+        state.guard.end_frame(forces, tissue, state.gripper.pose.translation, model.force_limit);
+        if model.force_limit.is_finite() {
+            let hit = hit_ahead(world, self, self.state.guard.motion());
+            self.state.guard.expect(hit);
+        }
         let Self { model, drive, state } = self;
-        let force = state.exchange.force() + state.solid.force();
-        state.guard.end_frame(force, tissue, state.gripper.pose.translation, model.force_limit);
         // Commands of joints are not guarded.
         if matches!(state.wanted, Wanted::Setpoint(..)) && state.guard.must_stop(model.force_limit) {
             drive.halt();

@@ -24,8 +24,10 @@ impl Cell {
     /// Sets the motions of the tools for a frame of tissue.
     pub(super) fn begin_tissue_frame(&mut self) -> FrameStart {
         self.motions.clear();
-        for arm in &mut self.arms {
-            self.motions.extend(arm.motions(FRAME));
+        for k in 0..self.arms.len() {
+            let wanted = self.arms[k].next_angle();
+            let angle = self.solids.turn_jaws(&self.arms, k, wanted);
+            self.motions.extend(self.arms[k].motions(angle, FRAME));
         }
         let newly_attached = self.arms.iter().any(|arm| arm.is_newly_attached(&self.world));
         FrameStart { state: newly_attached.then(|| self.world.state.clone()), clock: Instant::now() }
@@ -43,26 +45,35 @@ impl Cell {
 }
 
 impl ArmUnit {
-    /// The motions of the instrument's three tools over a tissue frame of `dt` (s).
-    fn motions(&mut self, dt: f64) -> [ToolMotion; 3] {
+    /// The angle of the jaws after the frame, as far as tissue lets them turn (rad).
+    fn next_angle(&mut self) -> f64 {
         let (model, state) = (&self.model, &mut self.state);
         let angle = state.gripper.jaw_angle;
         let target = state.wanted.jaw() * model.blades.max_angle;
         // A latched grasp locks the jaws; friction must continue to press.
-        let locked = state.held.is_some() && state.design != GraspDesign::Friction;
-        let next_angle = if locked {
-            angle
-        } else if target < angle {
-            let force = opening_force(&state.gripper, Tools::of(0), &state.forces);
+        if state.held.is_some() && state.design != GraspDesign::Friction {
+            return angle;
+        }
+        let force = opening_force(&state.gripper, Tools::of(0), &state.forces);
+        if target < angle {
             let free = state.jaw.squeeze(angle, force).max(target);
             let most = state.jaw.budget * model.blades.lever();
-            state.bite.as_mut().map_or(free, |bite| bite.close(angle, free, most))
-        } else {
-            if let Some(bite) = state.bite.as_mut().filter(|_| target > angle) {
-                bite.force = 0.0;
-            }
-            state.jaw.turn_to(angle, target)
-        };
+            return state.bite.as_mut().map_or(free, |bite| bite.close(angle, free, most));
+        }
+        if let Some(bite) = state.bite.as_mut().filter(|_| target > angle) {
+            bite.force = 0.0;
+        }
+        if model.force_limit.is_finite() && state.guard.sees_strain() {
+            return angle;
+        }
+        state.jaw.open(angle, target, force)
+    }
+
+    /// The motions of the instrument's three tools over a tissue frame of `dt` (s) after which the
+    /// jaws are at `next_angle` (rad).
+    fn motions(&mut self, next_angle: f64, dt: f64) -> [ToolMotion; 3] {
+        let (model, state) = (&self.model, &mut self.state);
+        let angle = state.gripper.jaw_angle;
         let next = Gripper { pose: self.drive.tip(), jaw_angle: next_angle };
         let mut motions = state.gripper.motions_to(&next);
         state.jaw_rate = (next_angle - angle) / (model.blades.max_angle * dt);

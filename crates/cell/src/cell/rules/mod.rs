@@ -15,6 +15,7 @@
 //! Contact of latched jaws is disabled in two steps: first that of the blades, which keep their
 //! grasp, then that of the whole instrument, which releases it.
 
+mod approach;
 mod enforce;
 mod force_guard;
 mod overstretch;
@@ -25,6 +26,7 @@ mod scope;
 mod strain;
 mod tissue_at_arm;
 
+pub(super) use approach::hit_ahead;
 pub(super) use force_guard::ForceGuard;
 pub(super) use strain::Edges;
 pub(super) use tissue_at_arm::TissueAtArm;

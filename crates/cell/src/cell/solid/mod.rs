@@ -12,6 +12,7 @@
 //! other triangles are not.
 
 mod bed;
+mod jaws;
 mod load;
 mod meeting;
 mod pair;

@@ -16,6 +16,10 @@ use trocar_geometry::{closest_on_triangle, nearest_of_segments};
 /// Least cosine of the angle between a triangle's normal and the direction in which it pushes.
 const LEAST_COSINE: f64 = 0.5;
 
+/// Share of a rod's radius by which it may come into tissue. An axis that came near the surface would
+/// get past the edge between two triangles, because a part is pushed by one triangle only.
+const ROOM: f64 = 0.5;
+
 /// Most triangles of a leaf.
 const LEAF: usize = 4;
 
@@ -67,19 +71,33 @@ impl PinnedSurface {
     /// Adds the meetings of `rods`.
     pub(super) fn meet(&self, rods: &[Rod], found: &mut Deepest) {
         for rod in rods {
-            let mut at = 0;
-            while let Some(node) = self.nodes.get(at) {
-                if !near_box(&rod.ends, rod.radius + REACH, node) {
-                    at = node.after;
-                    continue;
+            self.for_near(&rod.ends, rod.radius + REACH, |triangle| {
+                if let Some(meeting) = meeting(rod, triangle) {
+                    found.add(rod.part, meeting);
                 }
-                for triangle in &self.triangles[node.leaf[0]..node.leaf[1]] {
-                    if let Some(meeting) = meeting(rod, triangle) {
-                        found.add(rod.part, meeting);
-                    }
-                }
-                at += 1;
+            });
+        }
+    }
+
+    /// Whether the axis of one of `rods` goes through a triangle.
+    pub(super) fn is_crossed(&self, rods: &[Rod]) -> bool {
+        let mut crossed = false;
+        for rod in rods {
+            self.for_near(&rod.ends, 0.0, |triangle| crossed |= crosses(&rod.ends, triangle));
+        }
+        crossed
+    }
+
+    /// Calls `found` for the triangles whose boxes are within `reach` (m) of a segment.
+    fn for_near(&self, segment: &[DVec3; 2], reach: f64, mut found: impl FnMut(&[DVec3; 3])) {
+        let mut at = 0;
+        while let Some(node) = self.nodes.get(at) {
+            if !near_box(segment, reach, node) {
+                at = node.after;
+                continue;
             }
+            self.triangles[node.leaf[0]..node.leaf[1]].iter().for_each(&mut found);
+            at += 1;
         }
     }
 }
@@ -138,7 +156,6 @@ fn meeting(rod: &Rod, triangle: &[DVec3; 3]) -> Option<Meeting> {
     };
     // The nearest places are at an end of the axis or at an edge of the triangle, unless the axis
     // goes through it.
-    let heights = rod.ends.map(|p| (p - a).dot(outward));
     for p in rod.ends {
         add(p, closest_on_triangle(triangle, p));
     }
@@ -147,16 +164,25 @@ fn meeting(rod: &Rod, triangle: &[DVec3; 3]) -> Option<Meeting> {
         add(rod.ends[0].lerp(rod.ends[1], s), edge[0].lerp(edge[1], t));
     }
     let (distance, p, q) = best?;
-    if heights[0].min(heights[1]) < 0.0 {
-        let through = rod.ends[0].lerp(rod.ends[1], heights[0] / (heights[0] - heights[1]));
-        if heights[0].max(heights[1]) > 0.0 && closest_on_triangle(triangle, through).distance(through) < 1e-12 {
-            return None;
-        }
+    if crosses(&rod.ends, triangle) {
+        return None;
     }
     let normal = (p - q).try_normalize()?;
     if normal.dot(outward) < LEAST_COSINE {
         return None;
     }
     let gap = distance - rod.radius;
-    Some(Meeting { point: q + 0.5 * gap * normal, normal, gap, room: rod.radius })
+    Some(Meeting { point: q + 0.5 * gap * normal, normal, gap, room: ROOM * rod.radius })
+}
+
+/// Whether a segment goes through a triangle.
+fn crosses(ends: &[DVec3; 2], triangle: &[DVec3; 3]) -> bool {
+    let [a, b, c] = *triangle;
+    let normal = (b - a).cross(c - a);
+    let heights = ends.map(|p| (p - a).dot(normal));
+    if heights[0].min(heights[1]) >= 0.0 || heights[0].max(heights[1]) <= 0.0 {
+        return false;
+    }
+    let through = ends[0].lerp(ends[1], heights[0] / (heights[0] - heights[1]));
+    closest_on_triangle(triangle, through).distance(through) < 1e-12
 }

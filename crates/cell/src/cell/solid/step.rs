@@ -74,7 +74,7 @@ impl Solids {
     }
 
     /// The meetings of `arm`, whose rods are given, with all but other instruments.
-    fn still(&self, arm: &ArmUnit, rods: &[Rod]) -> Vec<Meeting> {
+    pub(super) fn still(&self, arm: &ArmUnit, rods: &[Rod]) -> Vec<Meeting> {
         let mut found = Vec::new();
         if let Some(height) = self.bed.filter(|_| arm.model.workspace.as_port().is_some()) {
             let mut deepest = Deepest::default();

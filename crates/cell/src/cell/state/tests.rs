@@ -56,7 +56,7 @@ fn changes(state: &ArmState, hold: &Hold) -> Vec<(&'static str, ArmState)> {
         ("wanted", changed(&|s| s.wanted = Wanted::Joints(0.25))),
         ("commanded", changed(&|s| s.commanded.0[2] += 1e-9)),
         ("held_back", changed(&|s| s.held_back ^= true)),
-        ("guard", changed(&|s| s.guard.end_frame(DVec3::X, Default::default(), DVec3::Y, 10.0))),
+        ("guard", changed(&|s| s.guard.end_frame([DVec3::X, DVec3::ZERO], Default::default(), DVec3::Y, 10.0))),
         ("guarded", changed(&|s| s.guarded ^= true)),
         ("solid", changed(&|s| s.solid.add(1e-9 * DVec3::X))),
         ("gripper", changed(&|s| s.gripper.pose.translation.x += 1e-9)),

@@ -36,6 +36,10 @@ const REACH: f64 = 2e-3;
 /// Triangles that are farther than this from a vertex than the nearest one (m) are left out.
 const BESIDE: f64 = 1e-3;
 
+/// Contacts of round shapes are harder from this share of the depth at which tissue would reach
+/// their axis.
+const HARD_FROM: f64 = 0.5;
+
 /// Length over which the smaller of two distances is rounded off at first and at last (m), and its
 /// share in the next round.
 const FIRST_BLUR: f64 = 3e-5;
@@ -169,6 +173,8 @@ impl<'a> Contacts<'a> {
     fn find_at_tool(&self, c: usize, x: &[DVec3], list: &mut Vec<Touch<'a>>) {
         let (of, Some([_, pose])) = (self.of, self.poses[c]) else { return };
         let collider = &of.colliders[c];
+        let hard_from = features::axis(&collider.shape)
+            .map_or(f64::INFINITY, |(_, radius)| HARD_FROM * (radius + collider.rest_offset));
         let mut push = |nodes: &[usize], end: u8, kind: Kind<'a>, free: f64, stiffness: f64| {
             let mut all = [nodes[0]; 4];
             all[..nodes.len()].copy_from_slice(nodes);
@@ -178,6 +184,7 @@ impl<'a> Contacts<'a> {
                 surface: None,
                 free,
                 stiffness,
+                hard_from,
                 friction: collider.friction,
                 grip: Grip::default(),
             };
@@ -237,6 +244,7 @@ impl<'a> Contacts<'a> {
                 free: *free,
                 // Two springs in a row, one in each body.
                 stiffness: 2.0 * law.stiffness * ours * theirs / (ours + theirs),
+                hard_from: f64::INFINITY,
                 friction: law.friction,
                 grip: Grip::default(),
             };
@@ -271,7 +279,7 @@ impl<'a> Contacts<'a> {
                 Touched::Body(_) => before,
             }
         });
-        let pressed = touch.stiffness * (-gap.depth).max(0.0);
+        let pressed = touch.pressure(gap.depth);
         let limit = if rubs && self.start.is_some() { touch.friction * pressed } else { 0.0 };
         touch.grip = Grip { normal: push.normalize_or_zero(), place, limit, shares: gap.shares };
     }
@@ -282,8 +290,9 @@ impl<'a> Contacts<'a> {
         for touch in &self.list {
             let gap = touch.gap(x, self.blur);
             if gap.depth < 0.0 {
-                energy += 0.5 * touch.stiffness * gap.depth * gap.depth;
-                gap.gradient.iter().for_each(|(i, slope)| add(*i, touch.stiffness * gap.depth * *slope));
+                energy += touch.energy(gap.depth);
+                let force = -touch.pressure(gap.depth);
+                gap.gradient.iter().for_each(|(i, slope)| add(*i, force * *slope));
             }
             if let Some(rub) = touch.rub(x) {
                 energy += rub.energy;
@@ -318,9 +327,9 @@ impl<'a> Contacts<'a> {
             let Some(force) = forces.get_mut(self.of.colliders[c].tool).filter(|_| gap.depth < 0.0) else { continue };
             let normal: DVec3 = gap.gradient.iter().map(|(_, g)| *g).sum();
             let rub = touch.rub(x).map_or(DVec3::ZERO, |rub| rub.gradient);
-            let push = touch.stiffness * gap.depth * normal + rub;
+            let push = -touch.pressure(gap.depth) * normal + rub;
             force.contact += Wrench::at(push, touch.point(x) - pose.translation);
-            force.pressing += touch.stiffness * -gap.depth;
+            force.pressing += touch.pressure(gap.depth);
             force.touching += 1;
         }
     }

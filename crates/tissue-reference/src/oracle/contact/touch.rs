@@ -31,10 +31,15 @@ pub struct Touch<'a> {
     pub free: f64,
     /// (N/m)
     pub stiffness: f64,
+    /// Depth from which the spring is [`HARDENING`] times as stiff (m).
+    pub hard_from: f64,
     /// Coefficient of friction.
     pub friction: f64,
     pub grip: Grip,
 }
+
+/// Stiffness of a contact that is deep over that of one that has just begun.
+const HARDENING: f64 = 25.0;
 
 /// The gap of a contact at one place.
 pub struct Gap {
@@ -84,6 +89,24 @@ impl Touch<'_> {
         gap
     }
 
+    /// How far a contact of some `depth` (m, negative where it presses) is pressed, and beyond where
+    /// it hardens (m).
+    fn pressed(&self, depth: f64) -> [f64; 2] {
+        [(-depth).max(0.0), (-depth - self.hard_from).max(0.0)]
+    }
+
+    /// Energy at a `depth` (J).
+    pub fn energy(&self, depth: f64) -> f64 {
+        let [soft, hard] = self.pressed(depth);
+        0.5 * self.stiffness * (soft * soft + (HARDENING - 1.0) * hard * hard)
+    }
+
+    /// Force that opens the gap at a `depth` (N).
+    pub fn pressure(&self, depth: f64) -> f64 {
+        let [soft, hard] = self.pressed(depth);
+        self.stiffness * (soft + (HARDENING - 1.0) * hard)
+    }
+
     /// Friction with its limit held; None without one.
     pub fn rub(&self, x: &[DVec3]) -> Option<Rub> {
         let Grip { normal, limit, .. } = self.grip;
@@ -121,7 +144,7 @@ impl Touch<'_> {
         if gap.depth >= 0.0 {
             return;
         }
-        let k = self.stiffness;
+        let k = self.stiffness * if -gap.depth > self.hard_from { HARDENING } else { 1.0 };
         let between = |one: &[(usize, DVec3)], factor: f64, into: &mut Stiffness| {
             for (i, a) in one {
                 for (j, b) in one {
@@ -134,7 +157,7 @@ impl Touch<'_> {
             return;
         }
         // The rounded minimum is concave, so its force makes it stiffer, outside of the surface.
-        let turn = k * gap.depth * gap.side;
+        let turn = -self.pressure(gap.depth) * gap.side;
         if self.pieces.len() > 1 && (turn <= 0.0 || !(project || secant)) {
             between(&gap.gradient, turn / blur, into);
             for (piece, (share, m)) in self.pieces.iter().zip(&gap.parts) {

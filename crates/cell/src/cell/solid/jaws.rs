@@ -1,0 +1,84 @@
+//! Jaws that turn until solids push their blades back with the jaw's force.
+//!
+//! Blades turn once a frame of tissue, by up to 1.4 mm at their tips, nearly their radius. Springs in
+//! the arms' steps would come too late for that.
+
+use super::Solids;
+use super::meeting::Meeting;
+use super::pair::meetings;
+use super::rod::Rod;
+use super::spring::Spring;
+use crate::Gripper;
+use crate::cell::arm::ArmUnit;
+use glam::DVec3;
+
+/// Bisections of the turn of jaws that solids stop.
+const BISECTIONS: usize = 8;
+
+/// A turn is checked in steps of at most this angle (rad): 0.7 mm at a blade's tip, so that no
+/// blade jumps over a solid.
+const MAX_TURN: f64 = 0.035;
+
+impl Solids {
+    /// The angle to which the jaws of arm `k` turn in this frame on their way to `wanted` (rad):
+    /// less far if solids would push back with more than the jaw's force, and with more than where
+    /// the jaws are.
+    pub fn turn_jaws(&self, arms: &[ArmUnit], k: usize, wanted: f64) -> f64 {
+        let angle = arms[k].state.gripper.jaw_angle;
+        if wanted == angle {
+            return wanted;
+        }
+        let direction = (wanted - angle).signum();
+        let crossed = self.blades_cross(&arms[k], angle);
+        let against = |at: f64| match !crossed && self.blades_cross(&arms[k], at) {
+            true => f64::INFINITY,
+            false => -direction * self.opening_force(arms, k, at),
+        };
+        let jaw = arms[k].state.jaw;
+        let most = if direction > 0.0 { jaw.opening_force() } else { jaw.budget };
+        let allowed = most.max(against(angle));
+        let steps = ((wanted - angle).abs() / MAX_TURN).ceil();
+        let mut reached = angle;
+        for step in 1..=steps as usize {
+            let next = angle + (wanted - angle) * step as f64 / steps;
+            if against(next) <= allowed {
+                reached = next;
+                continue;
+            }
+            let mut stopped = next;
+            for _ in 0..BISECTIONS {
+                let middle = 0.5 * (reached + stopped);
+                if against(middle) <= allowed { reached = middle } else { stopped = middle }
+            }
+            break;
+        }
+        reached
+    }
+
+    /// Whether the axis of a blade of `arm` goes through pinned tissue with the jaws at `angle` (rad).
+    /// What has crossed a surface is not pushed back by it.
+    fn blades_cross(&self, arm: &ArmUnit, angle: f64) -> bool {
+        let gripper = Gripper { pose: arm.drive.tip(), jaw_angle: angle };
+        let blades: Vec<Rod> = arm.rods_of(&gripper).into_iter().filter(|rod| rod.part != 0).collect();
+        self.pinned.is_crossed(&blades)
+    }
+
+    /// Force with which solids push the blades of arm `k` apart with the jaws at `angle` (N): the
+    /// mean over both blades of the outward force, as that of tissue.
+    fn opening_force(&self, arms: &[ArmUnit], k: usize, angle: f64) -> f64 {
+        let arm = &arms[k];
+        let gripper = Gripper { pose: arm.drive.tip(), jaw_angle: angle };
+        let rods = arm.rods_of(&gripper);
+        let mut sum = 0.0;
+        for (part, side) in [(1, 1.0), (2, -1.0)] {
+            let outwards = gripper.blade(side).rotation * (side * DVec3::Y);
+            let blade: Vec<Rod> = rods.iter().filter(|rod| rod.part == part).copied().collect();
+            let push = |m: Meeting| Spring::at(m.gap, m.room).force() * m.normal.dot(outwards);
+            sum += self.still(arm, &blade).into_iter().map(push).sum::<f64>();
+            for (_, other) in arms.iter().enumerate().filter(|(j, _)| *j != k) {
+                sum += meetings(&blade, &other.rods_at(other.drive.tip())).map(push).sum::<f64>();
+            }
+        }
+        0.5 * sum
+    }
+}

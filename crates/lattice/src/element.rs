@@ -1,0 +1,157 @@
+//! One hexahedron: energy, forces and stiffness, by selectively reduced integration.
+//!
+//! The deviatoric part has eight points, the volumetric part one, at the material's centroid. The
+//! empty part of a boundary cell is filled with a fictitious tissue that is softer by the factor
+//! [`LatticeOptions::fill`](crate::LatticeOptions), on the Gauss points of the whole cell.
+
+use crate::Hexahedron;
+use crate::material::{Material, Part, Principal};
+use crate::symmetric::Svd;
+use glam::{DMat3, DVec3};
+
+/// Offset of Gauss's two points from the middle of a side, over the side.
+const GAUSS: f64 = 0.288_675_134_594_812_9;
+
+/// The lower triangle of an element's stiffness: block (a, b) with b <= a lies at a(a+1)/2 + b.
+pub(crate) type Blocks = [DMat3; 36];
+
+/// Energy, forces and, on request, stiffness of one element.
+#[derive(Clone, Debug)]
+pub(crate) struct ElementResult {
+    /// (J).
+    pub energy: f64,
+    /// Gradient by each node's position (N).
+    pub gradient: [DVec3; 8],
+    /// Second derivative (N/m).
+    pub hessian: Option<Box<Blocks>>,
+}
+
+/// What of an element is wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wanted {
+    /// Energy and gradient.
+    Gradient,
+    /// The exact second derivative too.
+    Exact,
+    /// The second derivative projected to be positive semidefinite at each point.
+    Projected,
+}
+
+/// An element in its cell of edge `cell` (m).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Element<'a> {
+    pub hex: &'a Hexahedron,
+    pub cell: f64,
+    pub fill: f64,
+    pub material: &'a Material,
+}
+
+impl Element<'_> {
+    /// At the nodes' positions `x` (m).
+    pub fn evaluate(&self, x: &[DVec3; 8], wanted: Wanted) -> ElementResult {
+        let hessian = (wanted != Wanted::Gradient).then(|| Box::new([DMat3::ZERO; 36]));
+        let mut out = ElementResult { energy: 0.0, gradient: [DVec3::ZERO; 8], hessian };
+        self.for_points(|u, volume, part| self.add(u, volume, part, x, wanted, &mut out));
+        out
+    }
+
+    /// Visits the integration points: place in the cell from 0 to 1, volume (m3), part.
+    fn for_points(&self, mut visit: impl FnMut(DVec3, f64, Part)) {
+        let whole = self.cell.powi(3);
+        let mut rule = |centre: DVec3, spread: DMat3, volume: f64| {
+            for corner in CORNERS {
+                visit(centre + spread * corner, volume / 8.0, Part::Deviatoric);
+            }
+            visit(centre, volume, Part::Volumetric);
+        };
+        rule(self.hex.centre, self.hex.spread, self.hex.fraction * whole);
+        let empty = self.fill * (1.0 - self.hex.fraction);
+        if empty > 0.0 {
+            rule(DVec3::splat(0.5), DMat3::from_diagonal(DVec3::splat(GAUSS)), empty * whole);
+        }
+    }
+
+    fn add(&self, u: DVec3, volume: f64, part: Part, x: &[DVec3; 8], wanted: Wanted, out: &mut ElementResult) {
+        let gradients = shape_gradients(u).map(|g| g / self.cell);
+        let f = deformation(x, &gradients);
+        let svd = Svd::of(f);
+        let law = self.material.at(part, svd.s);
+        out.energy += volume * law.energy;
+        let stress = svd.u * DMat3::from_diagonal(law.first) * svd.v.transpose();
+        for (to, g) in out.gradient.iter_mut().zip(&gradients) {
+            *to += volume * (stress * *g);
+        }
+        if let Some(blocks) = &mut out.hessian {
+            let law = if wanted == Wanted::Projected { law.projected() } else { law };
+            // In the frame of the singular vectors the stiffness is sparse.
+            let turned = gradients.map(|g| svd.v.transpose() * g);
+            let mut to = blocks.iter_mut();
+            for a in 0..8 {
+                for b in 0..=a {
+                    let Some(to) = to.next() else { return };
+                    *to += svd.u * stiffness(&law, turned[a], turned[b]) * svd.u.transpose() * volume;
+                }
+            }
+        }
+    }
+
+    /// Least ratio of volumes J over the integration points.
+    pub fn least_volume_ratio(&self, x: &[DVec3; 8]) -> f64 {
+        let mut least = f64::INFINITY;
+        let ratio = |u: DVec3| deformation(x, &shape_gradients(u).map(|g| g / self.cell)).determinant();
+        self.for_points(|u, _, _| least = least.min(ratio(u)));
+        least
+    }
+}
+
+/// Corners of a cell about its middle.
+const CORNERS: [DVec3; 8] = [
+    DVec3::new(-1.0, -1.0, -1.0),
+    DVec3::new(1.0, -1.0, -1.0),
+    DVec3::new(-1.0, 1.0, -1.0),
+    DVec3::new(1.0, 1.0, -1.0),
+    DVec3::new(-1.0, -1.0, 1.0),
+    DVec3::new(1.0, -1.0, 1.0),
+    DVec3::new(-1.0, 1.0, 1.0),
+    DVec3::new(1.0, 1.0, 1.0),
+];
+
+/// Gradients of the eight trilinear shape functions at `u` in the unit cell.
+fn shape_gradients(u: DVec3) -> [DVec3; 8] {
+    CORNERS.map(|corner| {
+        // 1 - u or u along each axis.
+        let value = DVec3::splat(0.5) + corner * (u - DVec3::splat(0.5));
+        corner * DVec3::new(value.y * value.z, value.z * value.x, value.x * value.y)
+    })
+}
+
+/// F: the sum of x g^T.
+fn deformation(x: &[DVec3; 8], gradients: &[DVec3; 8]) -> DMat3 {
+    let mut f = DMat3::ZERO;
+    for (x, g) in x.iter().zip(gradients) {
+        f += DMat3::from_cols(*x * g.x, *x * g.y, *x * g.z);
+    }
+    f
+}
+
+/// The block of two nodes with shape gradients `a` and `b`, all in the frame of the singular
+/// vectors. A change dF = e_j b^T changes the stress on the diagonal by psi_ij, in symmetric shear
+/// by `shear` and in rotation by `twist`.
+fn stiffness(law: &Principal, a: DVec3, b: DVec3) -> DMat3 {
+    let even = 0.5 * (law.shear + law.twist);
+    let odd = 0.5 * (law.shear - law.twist);
+    let entry = |i: usize, j: usize| {
+        let on = law.second.col(j)[i] * a[i] * b[j];
+        if i == j {
+            let (k, l) = ((i + 1) % 3, (i + 2) % 3);
+            on + even[l] * a[k] * b[k] + even[k] * a[l] * b[l]
+        } else {
+            on + odd[3 - i - j] * a[j] * b[i]
+        }
+    };
+    let column = |j: usize| DVec3::new(entry(0, j), entry(1, j), entry(2, j));
+    DMat3::from_cols(column(0), column(1), column(2))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,150 @@
+//! Elements against finite differences, affine fields and rotations.
+
+use super::*;
+use crate::material::Law;
+use glam::DQuat;
+
+fn material(law: Law, poisson_ratio: f64) -> Material {
+    Material { law, young_modulus: 12e3, poisson_ratio, density: 1200.0 }
+}
+
+/// A full cell and a boundary cell.
+fn hexahedra() -> [Hexahedron; 2] {
+    let full = Hexahedron {
+        nodes: [0, 1, 2, 3, 4, 5, 6, 7],
+        cell: [0; 3],
+        fraction: 1.0,
+        centre: DVec3::splat(0.5),
+        spread: DMat3::from_diagonal(DVec3::splat(GAUSS)),
+    };
+    let spread =
+        DMat3::from_cols(DVec3::new(0.2, 0.05, 0.0), DVec3::new(0.05, 0.1, -0.02), DVec3::new(0.0, -0.02, 0.15));
+    [full, Hexahedron { fraction: 0.3, centre: DVec3::new(0.6, 0.3, 0.4), spread, ..full }]
+}
+
+const CELL: f64 = 3e-3;
+
+/// A number in -1..1 for each counter.
+fn noise(k: usize) -> f64 {
+    ((k as f64 * 12.9898 + 4.1414).sin() * 43758.547).fract()
+}
+
+fn moved(by: f64, affine: DMat3) -> [DVec3; 8] {
+    std::array::from_fn(|c| {
+        let rest = CELL * (0.5 * CORNERS[c] + DVec3::splat(0.5));
+        let d = DVec3::new(noise(3 * c), noise(3 * c + 1), noise(3 * c + 2));
+        affine * rest + by * CELL * d
+    })
+}
+
+fn elements(check: impl Fn(Element<'_>, [DVec3; 8], &str)) {
+    let turn = DMat3::from_quat(DQuat::from_euler(glam::EulerRot::XYZ, 2.5, -0.7, 1.0));
+    let squeezed = turn * DMat3::from_diagonal(DVec3::new(0.6, 0.9, 1.3));
+    for law in Law::ALL {
+        for nu in [0.0, 0.45, 0.499] {
+            for hex in &hexahedra() {
+                for (by, affine) in [(0.0, DMat3::IDENTITY), (0.05, turn), (0.15, squeezed)] {
+                    let material = material(law, nu);
+                    let element = Element { hex, cell: CELL, fill: 1e-3, material: &material };
+                    check(element, moved(by, affine), &format!("{law:?}, nu {nu}, {by}, fraction {}", hex.fraction));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn gradient_and_hessian_are_derivatives() {
+    elements(|element, x, name| {
+        let exact = element.evaluate(&x, Wanted::Exact);
+        let blocks = exact.hessian.unwrap();
+        let stiffness = 1e-6 * CELL * element.material.bulk_modulus() * element.hex.fraction;
+        for a in 0..8 {
+            for c in 0..3 {
+                let h = 1e-5 * CELL;
+                let at = |by: f64| {
+                    let mut x = x;
+                    x[a][c] += by;
+                    element.evaluate(&x, Wanted::Gradient)
+                };
+                let (more, less) = (at(h), at(-h));
+                let force = (more.energy - less.energy) / (2.0 * h);
+                assert!((force - exact.gradient[a][c]).abs() < stiffness * CELL, "{name}: {force}");
+                for b in 0..8 {
+                    let difference = (more.gradient[b] - less.gradient[b]) / (2.0 * h);
+                    let (row, column) = (a.max(b), a.min(b));
+                    let block = blocks[row * (row + 1) / 2 + column];
+                    let block = if b >= a { block } else { block.transpose() };
+                    let error = (difference - block.col(c)).length();
+                    assert!(error < 100.0 * stiffness, "{name}: ({b}, {a}) {error} of {stiffness}");
+                }
+            }
+        }
+    });
+}
+
+/// The projected stiffness has no negative curvature, and is exact where the exact one has none.
+#[test]
+fn the_projected_hessian_is_positive() {
+    let along = |blocks: &Blocks, d: &[DVec3; 8]| {
+        let mut sum = 0.0;
+        for a in 0..8 {
+            for b in 0..=a {
+                let twice = if a == b { 1.0 } else { 2.0 };
+                sum += twice * d[a].dot(blocks[a * (a + 1) / 2 + b] * d[b]);
+            }
+        }
+        sum
+    };
+    let mut indefinite = 0;
+    elements(|element, x, name| {
+        let exact = element.evaluate(&x, Wanted::Exact).hessian.unwrap();
+        let projected = element.evaluate(&x, Wanted::Projected).hessian.unwrap();
+        for k in 0..50 {
+            let d: [DVec3; 8] = std::array::from_fn(|c| {
+                DVec3::new(noise(99 * k + 3 * c), noise(99 * k + 3 * c + 1), noise(99 * k + 3 * c + 2))
+            });
+            assert!(along(&projected, &d) >= along(&exact, &d) - 1e-9, "{name}");
+            assert!(along(&projected, &d) >= 0.0, "{name}");
+        }
+    });
+    // Squeezing a rotated cell makes the exact one indefinite.
+    let [full, _] = hexahedra();
+    let material = material(Law::Corotated, 0.45);
+    let element = Element { hex: &full, cell: CELL, fill: 0.0, material: &material };
+    let x = moved(0.0, DMat3::from_diagonal(DVec3::splat(0.5)));
+    let exact = element.evaluate(&x, Wanted::Exact).hessian.unwrap();
+    let spin: [DVec3; 8] = std::array::from_fn(|c| DVec3::Z.cross(CORNERS[c]));
+    indefinite += usize::from(along(&exact, &spin) < 0.0);
+    assert_eq!(indefinite, 1);
+}
+
+/// An affine field gives the same F at every point: the energy is that of the volume.
+#[test]
+fn affine_fields_are_exact() {
+    let affine = DMat3::from_cols(DVec3::new(1.1, 0.2, -0.1), DVec3::new(-0.3, 0.8, 0.25), DVec3::new(0.05, -0.2, 1.3));
+    for law in Law::ALL {
+        for hex in &hexahedra() {
+            let material = material(law, 0.45);
+            let element = Element { hex, cell: CELL, fill: 0.0, material: &material };
+            let s = Svd::of(affine).s;
+            let density = material.at(Part::Deviatoric, s).energy + material.at(Part::Volumetric, s).energy;
+            let energy = element.evaluate(&moved(0.0, affine), Wanted::Gradient).energy;
+            assert!((energy / (density * hex.fraction * CELL.powi(3)) - 1.0).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn rotations_change_neither_energy_nor_forces() {
+    let turn = DMat3::from_quat(DQuat::from_euler(glam::EulerRot::XYZ, -1.5, 0.7, 3.0));
+    elements(|element, x, name| {
+        let here = element.evaluate(&x, Wanted::Gradient);
+        let there = element.evaluate(&x.map(|p| turn * p + DVec3::splat(0.1)), Wanted::Gradient);
+        let scale = element.material.bulk_modulus() * CELL.powi(3);
+        assert!((here.energy - there.energy).abs() < 1e-12 * scale, "{name}");
+        for (a, b) in here.gradient.iter().zip(&there.gradient) {
+            assert!((turn * *a - *b).length() < 1e-11 * scale / CELL, "{name}");
+        }
+    });
+}
