@@ -5,6 +5,10 @@
 //! Its stiffness is that of its vertices, and falls to 0 where the point reaches one of them, which
 //! touches by itself: the force does not jump where a blade slides from feature to feature.
 //!
+//! The point stays where it is on its edge or triangle for a substep, and then follows the tissue
+//! halfway. Tissue that tilts moves the point to the side that rises, which pushes it back: a point
+//! that follows a substep late, but all the way, swings from side to side farther each time.
+//!
 //! Friction is a spring whose stretch is kept in the tool's frame, by feature: the point may move
 //! along the edge from substep to substep.
 
@@ -143,8 +147,11 @@ impl FeatureContacts {
             tool_features::find(&body.surface, &self.x, triangles, on_axis, far, &mut self.found);
             for feature in &self.found {
                 let by = |anchor: &FeatureAnchor| (anchor.collider, anchor.feature).cmp(&(c as u32, feature.key));
-                let known = self.anchors.binary_search_by(by).map(|k| self.anchors[k].stretch);
-                let Feature { key, site } = *feature;
+                let known = self.anchors.binary_search_by(by).map(|k| self.anchors[k]);
+                let Feature { key, mut site } = *feature;
+                if let Ok(FeatureAnchor { weights, .. }) = known {
+                    site.weights = std::array::from_fn(|k| 0.5 * (site.weights[k] + weights[k]));
+                }
                 if site.shares().all(|(i, _)| fixed[i as usize]) {
                     continue;
                 }
@@ -163,7 +170,7 @@ impl FeatureContacts {
                     source: Source::Collider(c as u32),
                     normal,
                     point,
-                    place: local(p - known.unwrap_or(Vec3A::ZERO).as_dvec3()),
+                    place: local(p - known.map_or(Vec3A::ZERO, |anchor| anchor.stretch).as_dvec3()),
                     stiffness: stiffness(body, &site),
                     hard_from: collider.hard_from(),
                     friction: Friction::Coulomb(if placed.grips { 0.0 } else { collider.friction as f32 }),
@@ -193,6 +200,7 @@ impl FeatureContacts {
             self.next_anchors.push(FeatureAnchor {
                 collider: c,
                 feature: *key,
+                weights: contact.site.weights,
                 stretch: (placed.to.rotation.inverse() * along.as_dvec3()).as_vec3a(),
             });
             if let Some(force) = forces.get_mut(frame.colliders[c as usize].tool) {

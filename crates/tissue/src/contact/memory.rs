@@ -26,7 +26,8 @@ pub(crate) struct Anchor {
     pub place: Vec3A,
 }
 
-/// How far friction's spring between a point of an edge or triangle and a collider is stretched.
+/// Where a point of an edge or triangle is that presses on a collider, and how far friction's spring
+/// between them is stretched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FeatureAnchor {
     pub collider: u32,
@@ -34,6 +35,8 @@ pub(crate) struct FeatureAnchor {
     pub feature: FeatureKey,
     /// The point from where friction holds it without force, in the tool's frame (m).
     pub stretch: Vec3A,
+    /// The shares of the vertices in the point.
+    pub weights: [f32; 3],
 }
 
 /// How far friction's spring between a vertex and another body is stretched.

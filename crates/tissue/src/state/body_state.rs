@@ -103,10 +103,11 @@ impl BodyState {
             [*vertex, kind, *number].iter().for_each(|k| hash.update(&k.to_le_bytes()));
             hash_vector(hash, *place);
         }
-        for FeatureAnchor { collider, feature: (vertices, end), stretch } in feature_anchors {
+        for FeatureAnchor { collider, feature: (vertices, end), stretch, weights } in feature_anchors {
             [collider].into_iter().chain(vertices).for_each(|k| hash.update(&k.to_le_bytes()));
             hash.update(&[*end]);
             hash_vector(hash, *stretch);
+            weights.iter().for_each(|weight| hash.update(&weight.to_bits().to_le_bytes()));
         }
         for Stretch { vertex, other, by } in stretches {
             [vertex, other].iter().for_each(|k| hash.update(&k.to_le_bytes()));

@@ -34,7 +34,12 @@ fn full(model: &Model) -> State {
     let body = &mut state.bodies[0];
     body.anchors.push(Anchor { vertex: 1, source: Source::Collider(2), place: Vec3A::new(1.0, 2.0, 3.0) });
     let stretch = Vec3A::new(7.0, 8.0, 9.0);
-    body.feature_anchors.push(FeatureAnchor { collider: 1, feature: ([0, 1, 0], 1), stretch });
+    body.feature_anchors.push(FeatureAnchor {
+        collider: 1,
+        feature: ([0, 1, 0], 1),
+        stretch,
+        weights: [0.5, 0.5, 0.0],
+    });
     body.stretches.push(Stretch { vertex: 2, other: 3, by: Vec3A::new(4.0, 5.0, 6.0) });
     let compliance = Compliance {
         stiffness: 1.0,
@@ -69,11 +74,14 @@ fn body_changes(body: &BodyState) -> Vec<Change> {
     let WarmStart { falling, supported } = warm;
     let mut all = vectors(|body| &mut body.x, x.len());
     assert!(!*disturbed && !*relax && anchors.len() == 1 && stretches.len() == 1);
-    let [FeatureAnchor { collider: _, feature: _, stretch: _ }] = feature_anchors[..] else { panic!("one is there") };
+    let [FeatureAnchor { collider: _, feature: _, stretch: _, weights: _ }] = feature_anchors[..] else {
+        panic!("one is there")
+    };
     all.push(change(|s| s.bodies[0].feature_anchors[0].collider += 1));
     all.extend((0..3).map(|k| change(move |s| s.bodies[0].feature_anchors[0].feature.0[k] += 1)));
     all.push(change(|s| s.bodies[0].feature_anchors[0].feature.1 += 1));
     all.extend((0..3).map(|c| change(move |s| s.bodies[0].feature_anchors[0].stretch[c] += 1.0)));
+    all.extend((0..3).map(|k| change(move |s| s.bodies[0].feature_anchors[0].weights[k] += 1.0)));
     all.extend(vectors(|body| &mut body.v, v.len()));
     all.extend((0..falling.len()).map(|i| change(move |s| s.bodies[0].warm.falling[i] += 0.5)));
     all.extend((0..supported.len()).map(|i| change(move |s| s.bodies[0].warm.supported[i] ^= true)));
