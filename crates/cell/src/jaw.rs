@@ -15,7 +15,7 @@ use crate::gripper::MAX_ANGLE;
 /// `docs/measurements/grasp.md`.
 pub const JAW_FORCE: f64 = 0.5;
 
-/// Largest force with which jaws open against tissue (N), if they have it.
+/// Largest force with which jaws open against tissue, the bed and pinned tissue (N), if they have it.
 const OPENING_FORCE: f64 = 1.0;
 
 /// Time from wide open to closed, without tissue (s).
@@ -77,9 +77,14 @@ impl Jaw {
         self.press(angle, force, -1.0, self.budget)
     }
 
+    /// Largest force with which the jaw opens (N).
+    pub fn opening_force(&self) -> f64 {
+        self.budget.min(OPENING_FORCE)
+    }
+
     /// The same for a jaw that opens to `target` (rad).
     pub fn open(&mut self, angle: f64, target: f64, force: f64) -> f64 {
-        self.press(angle, force, 1.0, self.budget.min(OPENING_FORCE)).min(target)
+        self.press(angle, force, 1.0, self.opening_force()).min(target)
     }
 
     /// The angle (rad) after a frame in which the jaw presses with `budget` (N) in one `direction`: -1

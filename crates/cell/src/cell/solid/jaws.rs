@@ -1,5 +1,6 @@
-//! Jaws that turn until the bed or pinned tissue pushes their blades back with the scene's force
-//! limit, as ideal arms move. Another instrument yields instead: it is pushed away.
+//! Jaws that turn until the bed or pinned tissue pushes their blades back: with their opening force,
+//! or, when they close, with the scene's force limit, as ideal arms move. Another instrument yields
+//! instead: it is pushed away.
 //!
 //! Blades turn once a frame of tissue, by up to 1.4 mm at their tips, nearly their radius. Springs in
 //! the arms' steps would come too late for that.
@@ -21,8 +22,8 @@ const MAX_TURN: f64 = 0.035;
 
 impl Solids {
     /// The angle to which the jaws of `arm` turn in this frame on their way to `wanted` (rad):
-    /// less far if solids would push back with more than the force limit, and with more than where the
-    /// jaws are.
+    /// less far if solids would push back with more than that force, and with more than where the jaws
+    /// are.
     pub fn turn_jaws(&self, arm: &ArmUnit, wanted: f64) -> f64 {
         let angle = arm.state.gripper.jaw_angle;
         if wanted == angle {
@@ -34,7 +35,8 @@ impl Solids {
             true => f64::INFINITY,
             false => -direction * self.opening_force(arm, at),
         };
-        let allowed = arm.model.stop_force.max(against(angle));
+        let most = if direction > 0.0 { arm.state.jaw.opening_force() } else { arm.model.stop_force };
+        let allowed = most.max(against(angle));
         let steps = ((wanted - angle).abs() / MAX_TURN).ceil();
         let mut reached = angle;
         for step in 1..=steps as usize {
