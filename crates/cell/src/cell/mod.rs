@@ -48,10 +48,10 @@ pub use workspace::{FreeSpace, PortSpace, Reached, Workspace};
 use crate::{Error, Result, World};
 use arm::ArmUnit;
 use delay::{Delay, Waiting};
-use rules::Edges;
+use rules::{Edges, OrganWatch};
 use solid::{PinnedSurface, Solids};
 use std::time::Duration;
-use trocar_scene::{SafetyRules, Scene};
+use trocar_scene::Scene;
 use trocar_specimen::Specimen;
 use trocar_tissue::ToolMotion;
 
@@ -101,8 +101,8 @@ pub struct Cell {
     waiting: Waiting,
     /// Whether cuts sever tissue.
     sever: bool,
-    /// The safety rules that are applied.
-    rules: SafetyRules,
+    /// Whether the force guard sees the strain of tissue.
+    strain_guard: bool,
     /// Motions of the tools in the last frame.
     motions: Vec<ToolMotion>,
     edges: Edges,
@@ -111,7 +111,7 @@ pub struct Cell {
     /// Which contacts there are.
     contact: ContactParts,
     /// By body: frames for which it has been strained without an instrument at it.
-    waits: Vec<u32>,
+    watches: Vec<OrganWatch>,
     /// Whether the instruments touch and that was reported.
     touch: bool,
     timing: Timing,
@@ -150,7 +150,7 @@ impl Cell {
             edges: Edges::of(&world),
             solids: Solids { bed, pinned },
             contact,
-            waits: vec![0; world.model.bodies().len()],
+            watches: vec![OrganWatch::default(); world.model.bodies().len()],
             touch: false,
             world,
             arms,
@@ -161,7 +161,7 @@ impl Cell {
             delay: Delay::new(1e-3 * scene.rates.control_delay_ms, scene.rates.physics_hz, frames * physics_steps),
             waiting: Waiting::default(),
             sever: scene.task.sever,
-            rules: scene.safety.rules,
+            strain_guard: scene.safety.rules.strain_guard,
             timing: Timing::default(),
         })
     }

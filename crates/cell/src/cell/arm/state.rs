@@ -65,10 +65,8 @@ pub(crate) struct ArmState {
     pub held: Option<Held>,
     /// Tissue frames for which jaws that closed on tissue have stood where they are commanded.
     pub standing: u32,
-    /// Whether contact of the whole instrument is disabled.
-    pub contact_disabled: bool,
-    /// Whether contact of the blades is disabled, until they release their grasp.
-    pub blades_disabled: bool,
+    /// Whether the instrument's axis is inside an organ.
+    pub pierces: bool,
     /// Largest RCM deviation of the period so far (m).
     pub rcm_peak: f64,
     /// Which of the RCM limits are exceeded, and that was reported.
@@ -130,8 +128,7 @@ impl ArmState {
             parting: None,
             held: None,
             standing: 0,
-            contact_disabled: false,
-            blades_disabled: false,
+            pierces: false,
             rcm_peak: 0.0,
             rcm_reported: [false; 2],
         }
@@ -159,8 +156,7 @@ impl ArmState {
             parting,
             held,
             standing,
-            contact_disabled,
-            blades_disabled,
+            pierces,
             rcm_peak,
             rcm_reported,
         } = self;
@@ -184,15 +180,7 @@ impl ArmState {
             }
             all.extend([*pressing, *touching as f64]);
         }
-        let flags = [
-            *contact_disabled,
-            *blades_disabled,
-            *held_back,
-            *guarded,
-            rcm_reported[0],
-            rcm_reported[1],
-            held.is_some(),
-        ];
+        let flags = [*pierces, *held_back, *guarded, rcm_reported[0], rcm_reported[1], held.is_some()];
         all.extend(flags.map(|b| f64::from(u8::from(b))));
         all.push(GraspDesign::ALL.iter().position(|d| d == design).unwrap_or(0) as f64);
         if let Some(Held { organ, s, hold, opening }) = held {

@@ -11,7 +11,7 @@ use trocar_tissue::Shape;
 impl ArmUnit {
     /// Whether the instrument may be the cause of the tissue's strain.
     pub fn meets_tissue(&self) -> bool {
-        self.state.contact_disabled || self.state.held.is_some() || self.state.forces.iter().any(|f| f.touching > 0)
+        self.state.held.is_some() || self.state.forces.iter().any(|f| f.touching > 0)
     }
 
     /// Distance of a point from the instrument's axis, from the blades' tips up its shaft (m).
@@ -58,10 +58,10 @@ impl ArmUnit {
         [(self.model.tools.gripper, gripper.pose), one, two]
     }
 
-    /// The organ that a part of the instrument with contact has pierced, except what the jaws hold
-    /// and the blades shear.
+    /// The organ that a part of the instrument has pierced, except what the jaws hold and the blades
+    /// shear.
     pub fn pierces(&self, world: &World) -> Option<usize> {
-        let felt = if self.state.shears.is_some() || self.state.blades_disabled { 1 } else { 3 };
+        let felt = if self.state.shears.is_some() { 1 } else { 3 };
         self.inside_organ(world, felt)
     }
 

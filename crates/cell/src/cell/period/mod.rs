@@ -53,7 +53,7 @@ impl Cell {
             let tissue = stepper.step_with_loads(model, state, &self.motions, &[]);
             self.end_tissue_frame(start, &tissue, &mut log);
             self.exchange_forces(&mut log)?;
-            let at_arms = self.enforce_tissue_limits(tissue.min_volume_ratio, &mut log);
+            let at_arms = self.watch_tissue(tissue.min_volume_ratio, &mut log);
             self.stop_in_time(&at_arms);
             // The time of whoever watches is not the cell's.
             wall += clock.elapsed();

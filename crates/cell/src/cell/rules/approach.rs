@@ -16,7 +16,7 @@ const FRAMES_AHEAD: [f64; 2] = [1.0, 2.0];
 /// slower than [`FASTEST_TOUCH`].
 pub(in crate::cell) fn hit_ahead(world: &World, arm: &ArmUnit, way: DVec3) -> DVec3 {
     let (mut fastest, mut out) = (FASTEST_TOUCH * FRAME, DVec3::ZERO);
-    if way.length() <= fastest || arm.state.contact_disabled {
+    if way.length() <= fastest {
         return out;
     }
     let rods = arm.rods();

@@ -5,7 +5,7 @@ use super::strain::Strain;
 use crate::cell::arm::ArmUnit;
 
 /// Stretch of an edge and share of its rest volume of an element at which the force guard stops an
-/// arm. The other rules act later.
+/// arm. Warnings come later.
 const MAX_STRETCH: f64 = 4.0;
 const MIN_VOLUME: f64 = 0.03;
 

@@ -81,14 +81,12 @@ impl Solids {
             super::bed::meet(height, rods, &mut deepest);
             found.extend(deepest.into_iter());
         }
-        // Where the contact of tissue is off, that of pinned tissue is.
-        if !arm.state.contact_disabled {
-            let shaft_only = arm.state.blades_disabled || arm.state.shears.is_some();
-            let felt = |rod: &&Rod| !shaft_only || rod.part == 0;
-            let mut deepest = Deepest::default();
-            self.pinned.meet(&rods.iter().filter(felt).copied().collect::<Vec<_>>(), &mut deepest);
-            found.extend(deepest.into_iter());
-        }
+        // Blades that shear push no tissue.
+        let shaft_only = arm.state.shears.is_some();
+        let felt = |rod: &&Rod| !shaft_only || rod.part == 0;
+        let mut deepest = Deepest::default();
+        self.pinned.meet(&rods.iter().filter(felt).copied().collect::<Vec<_>>(), &mut deepest);
+        found.extend(deepest.into_iter());
         found
     }
 

@@ -41,8 +41,7 @@ fn changes(state: &ArmState, hold: &Hold) -> Vec<(&'static str, ArmState)> {
         bite: _,
         parting: _,
         held: _,
-        contact_disabled: _,
-        blades_disabled: _,
+        pierces: _,
         rcm_peak: _,
         rcm_reported: _,
         standing: _,
@@ -72,8 +71,7 @@ fn changes(state: &ArmState, hold: &Hold) -> Vec<(&'static str, ArmState)> {
         ("parting", changed(&|s| s.parting = Some(Parting::default()))),
         ("standing", changed(&|s| s.standing = 3)),
         ("held", changed(&|s| s.held = Some(Held { organ: 0, s: 0.5, hold: hold.clone(), opening: 0.1 }))),
-        ("contact_disabled", changed(&|s| s.contact_disabled ^= true)),
-        ("blades_disabled", changed(&|s| s.blades_disabled ^= true)),
+        ("pierces", changed(&|s| s.pierces ^= true)),
         ("rcm_peak", changed(&|s| s.rcm_peak += 1e-9)),
         ("rcm_reported", changed(&|s| s.rcm_reported[1] ^= true)),
     ]
@@ -100,8 +98,8 @@ fn hash_and_restore_carry_every_field() {
         change(&mut other);
         other
     };
-    let CellState { world: _, arms: _, waits: _, touch: _, waiting: _, periods: _ } = &saved;
-    others.push(("waits", changed(&|s| s.waits.push(3))));
+    let CellState { world: _, arms: _, watches: _, touch: _, waiting: _, periods: _ } = &saved;
+    others.push(("watches", changed(&|s| s.watches[0].frames_alone += 1)));
     others.push(("touch", changed(&|s| s.touch ^= true)));
     let action = Action { space: ActionSpace::Pivots, numbers: vec![0.0; 5] };
     others.push(("waiting", changed(&|s| s.waiting.0.push_back(None))));

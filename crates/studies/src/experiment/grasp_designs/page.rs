@@ -3,7 +3,7 @@
 
 use super::result::{DESIGNS, GraspDesignRow, GraspDesignsResult, GraspTrial};
 use crate::Result;
-use crate::experiment::appendix::{Condition, remarks, suspensions};
+use crate::experiment::appendix::{Condition, remarks};
 use crate::names::design_name;
 use crate::trials::resumed;
 use trocar_report::colors;
@@ -110,7 +110,7 @@ fn table_ii(r: &GraspDesignsResult, condition: Condition) -> Table {
             ),
             count(row.inverted_peak),
             fixed(row.min_volume_ratio, 2),
-            suspensions(row.suspensions),
+            row.warnings.to_string(),
         ]
     };
     let paper = |row: &GraspDesignRow| {
@@ -212,7 +212,7 @@ fn trials(r: &GraspDesignsResult) -> Section {
             ("Pull (N)", &|t| fixed(t.peak_constraint_n, 2)),
             ("Yielded", &|t| count(t.yielded_substeps)),
             ("Smallest volume", &|t| fixed(t.min_volume_ratio, 2)),
-            ("Suspensions", &|t| suspensions(t.suspensions)),
+            ("Warnings", &|t| t.warnings.to_string()),
             ("Remarks", &|t| remarks(t.divergence.as_ref(), t.why.as_ref(), (t.slipped, t.torn), inverted(t))),
         ],
     );
