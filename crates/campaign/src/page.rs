@@ -129,6 +129,8 @@ fn cards(manifest: &Manifest, r: &CampaignResult) -> String {
     let diverged: usize = r.policies.iter().map(|p| p.ends.diverged).sum();
     all.push(Card::new("Inverted elements", inverted.to_string(), "maximum of any frame").met(inverted == 0));
     all.push(Card::new("Diverged", diverged.to_string(), "episodes").met(diverged == 0));
+    let note = "organs punctured by instruments, with the scene's force or more";
+    all.push(Card::new("Punctures", r.punctures.to_string(), note).met(r.punctures == 0));
     let s = &r.suspensions;
     let counts = [s.disabled_contacts, s.disabled_blades, s.relaxed];
     let note = "of physics by safety rules: contacts disabled / contacts of blades disabled / organs relaxed";
@@ -160,6 +162,7 @@ fn outcome(r: &CampaignResult) -> String {
             ("lag (ms)", &|p| or_dash(p.lag_ms, 0)),
             ("jaw force (N)", &|p| or_dash(p.peak_jaw_n, 2)),
             ("grasp at s", &|p| p.grasp_at.map_or_else(dash, at)),
+            ("punctures", &|p| p.punctures.to_string()),
             ("suspensions", &|p| p.suspensions()),
         ],
     );

@@ -115,6 +115,8 @@ pub struct PolicyRow {
     pub lag_ms: Option<f64>,
     /// Maximum number of inverted elements in any frame.
     pub inverted_peak: usize,
+    /// Number of times that an instrument punctured an organ.
+    pub punctures: usize,
     /// Number of times that contact of an instrument was disabled: a suspension of physics.
     pub disabled_contacts: usize,
     /// Number of times that contact of blades that hold tissue was disabled.
@@ -173,6 +175,8 @@ pub struct CampaignResult {
     /// Sum over the policies of the episodes that differ from each other in any figure by more than
     /// can be measured: 0.01 mm, 0.001 N or one control period.
     pub distinct_outcomes: usize,
+    /// Number of times that an instrument punctured an organ, in all episodes.
+    pub punctures: usize,
     /// Suspensions of physics.
     pub suspensions: Suspensions,
     /// What varied, and what was drawn.
@@ -226,6 +230,7 @@ impl CampaignResult {
             planned: manifest.count(),
             passed: records.iter().filter(|k| k.summary.passed).count(),
             distinct_outcomes: policies.iter().map(|p| p.distinct_outcomes).sum(),
+            punctures: policies.iter().map(|p| p.punctures).sum(),
             suspensions: Suspensions {
                 disabled_contacts: policies.iter().map(|p| p.disabled_contacts).sum(),
                 disabled_blades: policies.iter().map(|p| p.disabled_blades).sum(),
@@ -287,6 +292,7 @@ fn row(name: &str, records: &[&EpisodeRecord], names: &[&str], manifest: &Manife
         peak_jaw_n: peak(|a| a.peak_jaw_n),
         lag_ms: median(records.iter().filter_map(|k| k.lag_ms()).collect()),
         inverted_peak: records.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),
+        punctures: records.iter().map(|k| k.summary.punctures).sum(),
         disabled_contacts: records.iter().map(|k| k.summary.disabled_contacts).sum(),
         disabled_blades: records.iter().map(|k| k.summary.disabled_blades).sum(),
         relaxed: records.iter().map(|k| k.summary.relaxed).sum(),

@@ -124,7 +124,7 @@ pub(super) fn episodes(records: &[EpisodeRecord]) -> String {
         .iter()
         .find_map(|k| k.summary.drawn.as_ref())
         .map_or_else(Vec::new, |drawn| drawn.values.iter().map(|v| v.name()).collect());
-    let fixed = ["policy", "seed", "split", "passed", "stages", "end", "suspensions", "specimen"];
+    let fixed = ["policy", "seed", "split", "passed", "stages", "end", "punctures", "suspensions", "specimen"];
     let head = fixed.into_iter().chain(names.iter().map(String::as_str));
     let row = |k: &EpisodeRecord| {
         let s = &k.summary;
@@ -140,6 +140,7 @@ pub(super) fn episodes(records: &[EpisodeRecord]) -> String {
             yes_or_no(s.passed),
             format!("{} of {}", s.stage, s.progress.stages.len()),
             if s.passed { "passed".to_owned() } else { k.why() },
+            s.punctures.to_string(),
             format!("{}/{}/{}", s.disabled_contacts, s.disabled_blades, s.relaxed),
             drawn.map_or("\u{2013}".to_owned(), |d| d.specimen.label()),
         ];

@@ -136,13 +136,22 @@ pub struct Safety {
     pub rcm_abort_mm: f64,
     /// Force of tissue on an instrument against which no command pushes it on (N).
     pub force_limit_n: f64,
+    /// An instrument that comes through the surface of an organ punctures it if it pressed on it
+    /// with at least this force (N); with less, it has pierced it, and the rule `pierce` applies.
+    pub puncture_force_n: f64,
     /// The rules of the cell that are applied; all by default.
     pub rules: SafetyRules,
 }
 
 impl Default for Safety {
     fn default() -> Self {
-        Self { rcm_threshold_mm: 3.0, rcm_abort_mm: 5.0, force_limit_n: 10.0, rules: SafetyRules::default() }
+        Self {
+            rcm_threshold_mm: 3.0,
+            rcm_abort_mm: 5.0,
+            force_limit_n: 10.0,
+            puncture_force_n: 10.0,
+            rules: SafetyRules::default(),
+        }
     }
 }
 
@@ -153,7 +162,8 @@ impl Default for Safety {
 pub struct SafetyRules {
     /// A command is shortened where tissue pushes back with `force_limit_n`.
     pub force_guard: bool,
-    /// An instrument that has gone through the surface of an organ loses its contact.
+    /// An instrument that has gone through the surface of an organ, with less than
+    /// `puncture_force_n`, loses its contact.
     pub pierce: bool,
     /// An instrument that strains tissue beyond what tissue bears loses its contact.
     pub overstretch: bool,

@@ -178,6 +178,8 @@ row! {
         fallbacks,
         /// The tissue diverged.
         diverged,
+        /// Times that an instrument punctured an organ in the period.
+        punctures,
         /// Times that contact of an instrument was disabled in the period.
         disabled_contacts,
         /// Times that contact of blades alone was disabled.

@@ -242,7 +242,7 @@ impl Episode {
                 let task = &mut channels.task;
                 (task.diverged, task.cuts, task.torn, task.yielded) = (1.0, 0.0, 0.0, 0.0);
                 (task.disabled_contacts, task.disabled_blades, task.relaxed) = (0.0, 0.0, 0.0);
-                task.activation_step_mm = 0.0;
+                (task.punctures, task.activation_step_mm) = (0.0, 0.0);
                 self.now.rows.push(channels);
                 let (progress, end) = (self.progress().clone(), self.now.end.clone());
                 return Ok(Step { channels, progress, end, events: Vec::new() });

@@ -69,6 +69,7 @@ impl Subject {
             yielded: report.tissue.yielded_substeps as f64,
             fallbacks: report.tissue.fallbacks as f64,
             diverged: flag(report.tissue.divergence.is_some()),
+            punctures: report.rules.punctures as f64,
             disabled_contacts: report.rules.disabled_contacts as f64,
             disabled_blades: report.rules.disabled_blades as f64,
             relaxed: report.rules.relaxed as f64,

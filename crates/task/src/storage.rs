@@ -20,12 +20,12 @@ use xxhash_rust::xxh3::Xxh3;
 /// The key of [`ChannelsInfo`] in the file's metadata.
 const KEY: &str = "trocar";
 const FORMAT: &str = "trocar-channels";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// What a column of this version was called in files of an earlier `version`. `None` for one that
 /// they do not have, which is read as zeros.
 fn name_in(version: u32, name: &str) -> Option<String> {
-    if name.ends_with("_solid_n") {
+    if name == "punctures" || version < 3 && name.ends_with("_solid_n") {
         return None;
     }
     if version > 1 {

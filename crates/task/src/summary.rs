@@ -115,6 +115,9 @@ pub struct Summary {
     pub rcm_peak_mm: f64,
     /// It never went beyond the scene's threshold (3 mm).
     pub rcm_within: bool,
+    /// Times that an instrument punctured an organ.
+    #[serde(default)]
+    pub punctures: usize,
     /// Times that contact of an instrument with tissue was disabled: a suspension of physics.
     #[serde(default)]
     pub disabled_contacts: usize,
@@ -177,6 +180,7 @@ impl Summary {
             max_speed_m_s: most(|c| c.task.max_speed_m_s),
             rcm_peak_mm,
             rcm_within: rcm_peak_mm <= threshold_mm,
+            punctures: count(|t| t.punctures),
             disabled_contacts: count(|t| t.disabled_contacts),
             disabled_blades: count(|t| t.disabled_blades),
             relaxed: count(|t| t.relaxed),

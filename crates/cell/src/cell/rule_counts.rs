@@ -7,7 +7,9 @@ use serde::Serialize;
 pub struct RuleCounts {
     /// Commands that the force guard shortened.
     pub guarded: usize,
-    /// Instruments that had pierced an organ.
+    /// Instruments that punctured an organ: no suspension of physics.
+    pub punctures: usize,
+    /// Instruments that had pierced an organ with less force than punctures it.
     pub pierced: usize,
     /// Instruments that had overstretched or crushed tissue.
     pub overstretched: usize,

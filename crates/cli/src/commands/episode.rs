@@ -88,6 +88,9 @@ fn text(made: &EpisodeOutput) -> String {
     for said in [&s.why, &s.advice].into_iter().flatten() {
         remarks += &format!("\n{said}");
     }
+    if s.punctures > 0 {
+        remarks += &format!("\npunctures: {}", s.punctures);
+    }
     if let Some(said) = s.suspensions() {
         remarks += &format!("\nsuspensions of physics: {said}");
     }

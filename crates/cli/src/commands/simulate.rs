@@ -92,6 +92,9 @@ pub fn text(r: &LiftResult) -> String {
     for arm in s.arms.iter().filter(|a| a.rcm_peak_mm > 0.0) {
         text += &format!("\n{}: {}", arm.arm, rcm(arm));
     }
+    if s.punctures > 0 {
+        text += &format!("\npunctures: {}", s.punctures);
+    }
     if let Some(said) = s.suspensions() {
         text += &format!("\nsuspensions of physics: {said}");
     }

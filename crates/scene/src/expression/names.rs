@@ -83,7 +83,7 @@ const ARM: [(&str, Kind); 41] = [
     ("solid_n", In(Unit::Newton)),
 ];
 
-const TASK: [(&str, Kind, Needs); 27] = [
+const TASK: [(&str, Kind, Needs); 28] = [
     ("grasp_distance_mm", In(Unit::Millimetre), Needs::GRASPER),
     ("grasped", Flag, Needs::GRASPER),
     ("grasp_s", In(Unit::None), Needs::GRASPER),
@@ -107,6 +107,7 @@ const TASK: [(&str, Kind, Needs); 27] = [
     ("yielded", In(Unit::None), Needs::NOTHING),
     ("fallbacks", In(Unit::None), Needs::NOTHING),
     ("diverged", Flag, Needs::NOTHING),
+    ("punctures", In(Unit::None), Needs::NOTHING),
     ("disabled_contacts", In(Unit::None), Needs::NOTHING),
     ("disabled_blades", In(Unit::None), Needs::NOTHING),
     ("relaxed", In(Unit::None), Needs::NOTHING),

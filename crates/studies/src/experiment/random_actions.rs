@@ -66,12 +66,16 @@ pub struct RandomActionsRow {
     /// Way of both tips (m).
     #[serde(default)]
     pub path_m: f64,
-    /// Actions after which an instrument's axis was inside an organ, over both arms.
+    /// Actions after which an instrument's axis was inside an organ that it had not punctured, over
+    /// both arms.
     #[serde(default)]
     pub axes_inside: usize,
-    /// How often an instrument's axis came into an organ.
+    /// How often an instrument's axis came into an organ with less force than punctures it.
     #[serde(default)]
     pub pierced: usize,
+    /// How often an instrument punctured an organ.
+    #[serde(default)]
+    pub punctures: usize,
     /// How often contact between an instrument and tissue was disabled.
     pub disabled_contacts: usize,
     /// How often contact between holding blades and tissue was disabled.
@@ -93,10 +97,14 @@ pub struct RandomActionsResult {
     pub actions: usize,
     /// Disabled contacts, of instruments or blades, and relaxed organs, in 1,000 actions.
     pub suspensions_per_1000_actions: f64,
-    /// Actions after which an instrument's axis was inside an organ, of all seeds.
+    /// Actions after which an instrument's axis was inside an organ that it had not punctured, of all
+    /// seeds.
     pub axes_inside: usize,
-    /// How often an instrument's axis came into an organ, in all seeds.
+    /// How often an instrument's axis came into an organ with less force than punctures it, in all
+    /// seeds.
     pub pierced: usize,
+    /// How often an instrument punctured an organ, in all seeds.
+    pub punctures: usize,
     /// Largest number of inverted elements in any frame of any seed.
     pub inverted_peak: usize,
     /// Seeds that diverged.
@@ -140,6 +148,7 @@ impl Study for RandomActionsExperiment {
             suspensions_per_1000_actions: 1e3 * suspensions as f64 / actions.max(1) as f64,
             axes_inside: sum(|r| r.axes_inside),
             pierced: sum(|r| r.pierced),
+            punctures: sum(|r| r.punctures),
             inverted_peak: rows.iter().map(|r| r.inverted_peak).max().unwrap_or(0),
             diverged: sum(|r| usize::from(r.diverged.is_some())),
             path_m: rows.iter().map(|r| r.path_m).sum(),
@@ -212,6 +221,7 @@ fn run(
     };
     row.force_max_n = episode.rows().iter().flat_map(|c| c.arms().map(force)).fold(0.0, f64::max);
     (row.disabled_contacts, row.disabled_blades, row.relaxed) = (s.disabled_contacts, s.disabled_blades, s.relaxed);
+    row.punctures = s.punctures;
     row.guarded = s.arms.iter().map(|a| a.guarded).sum();
     Ok(row)
 }
@@ -231,9 +241,9 @@ fn joint_limits_broken(cell: &Cell) -> Result<usize> {
 
 fn document(r: &RandomActionsResult) -> Document {
     let lead = format!(
-        "Random valid actions in the cell of {}, from {} seeds. Contact of an instrument that pierces, hooks or \
-         crushes tissue is disabled until the instrument is outside; an organ that stays folded is \
-         relaxed. Both are counted.",
+        "Random valid actions in the cell of {}, from {} seeds. An instrument that comes through the surface of an \
+         organ with the scene's force punctures it. Contact of one that pierces with less, hooks or crushes tissue \
+         is disabled until the instrument is outside; an organ that stays folded is relaxed. All are counted.",
         page::escape(&r.scene),
         r.rows.len()
     );
@@ -245,7 +255,8 @@ fn document(r: &RandomActionsResult) -> Document {
             .met(good == r.rows.len()),
         Card::new("Suspensions of physics", fixed(r.suspensions_per_1000_actions, 2), "in 1,000 actions")
             .met(r.suspensions_per_1000_actions <= 1.0),
-        Card::new("Axes inside organs", count(r.axes_inside), "actions after which one is inside")
+        Card::new("Punctures", count(r.punctures), "organs punctured by instruments").met(r.punctures == 0),
+        Card::new("Axes inside organs", count(r.axes_inside), "actions after which one is inside without a puncture")
             .met(r.axes_inside == 0),
         Card::new("Joints beyond their limits", count(broken), "over all actions").met(broken == 0),
     ];
@@ -263,6 +274,7 @@ fn document(r: &RandomActionsResult) -> Document {
             ("Way (m)", &|row| fixed(row.path_m, 2)),
             ("Actions with an axis inside", &|row| count(row.axes_inside)),
             ("Pierced", &|row| count(row.pierced)),
+            ("Punctured", &|row| count(row.punctures)),
             ("Contacts disabled", &|row| count(row.disabled_contacts)),
             ("Contacts of blades disabled", &|row| count(row.disabled_blades)),
             ("Relaxed", &|row| count(row.relaxed)),

@@ -102,6 +102,8 @@ pub struct RolloutsResult {
     pub rcm_within_5_mm: usize,
     /// Largest number of inverted elements in any frame.
     pub inverted_peak: usize,
+    /// Punctures in all rollouts.
+    pub punctures: usize,
     /// Suspensions in all rollouts: contacts disabled, contacts of blades disabled, organs relaxed.
     pub suspensions: [usize; 3],
     /// Rows of the controllers.
@@ -169,6 +171,7 @@ impl RolloutsResult {
             rcm_within_3_mm: within(THRESHOLD_MM),
             rcm_within_5_mm: within(ABORT_MM),
             inverted_peak: records.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),
+            punctures: made.punctures,
             suspensions: [
                 records.iter().map(|k| k.summary.disabled_contacts).sum(),
                 records.iter().map(|k| k.summary.disabled_blades).sum(),
@@ -198,6 +201,7 @@ fn document(manifest: &Manifest, r: &RolloutsResult, records: &[EpisodeRecord]) 
         Card::new("Diverged", count(r.diverged), "of all rollouts").met(r.diverged == 0),
         Card::new("Inverted elements", count(r.inverted_peak), "largest number in any frame").met(r.inverted_peak == 0),
         Card::new("Passed", format!("{} of {}", r.passed, r.rollouts), "all stages"),
+        Card::new("Punctures", count(r.punctures), "organs punctured by instruments").met(r.punctures == 0),
         Card::new(
             "Suspensions",
             r.suspensions.map(|n| n.to_string()).join("/"),

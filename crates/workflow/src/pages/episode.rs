@@ -74,6 +74,7 @@ fn cards(recording: &Recording, real_time_factor: f64) -> String {
     );
     cards.push(Card::new("Peak force", format!("{} N", fixed(over_time::peak(s, |a| a.peak_contact_n), 2)), contact));
     cards.push(over_time::inverted_card(s));
+    cards.push(over_time::punctures_card(s));
     cards.push(over_time::suspensions_card(s));
     page::cards(&cards)
 }

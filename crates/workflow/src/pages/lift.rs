@@ -80,6 +80,7 @@ fn cards(lifted: &FinishedLift) -> String {
             format!("constraint; contact {} N", fixed(over_time::peak(s, |a| a.peak_contact_n), 2)),
         ),
         over_time::inverted_card(s),
+        over_time::punctures_card(s),
         over_time::suspensions_card(s),
         Card::new("Speed", format!("{}\u{d7}", fixed(r.real_time_factor, 2)), "of real time, arms and tissue"),
     ]);

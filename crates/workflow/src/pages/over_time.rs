@@ -56,6 +56,12 @@ pub(super) fn inverted_card(s: &Summary) -> Card {
     Card::new("Inverted elements", s.inverted_peak.to_string(), "maximum of any frame").met(s.inverted_peak == 0)
 }
 
+/// The card with the number of punctures.
+pub(super) fn punctures_card(s: &Summary) -> Card {
+    let note = "organs punctured by instruments";
+    Card::new("Punctures", s.punctures.to_string(), note).met(s.punctures == 0)
+}
+
 /// The card with the suspensions of physics.
 pub(super) fn suspensions_card(s: &Summary) -> Card {
     let count = s.disabled_contacts + s.disabled_blades + s.relaxed;

@@ -41,6 +41,6 @@ impl Cell {
         if !rules.overstretch {
             return none;
         }
-        self.arms.iter().map(|arm| TissueAtArm::of(arm, &strains)).collect()
+        self.arms.iter().map(|arm| TissueAtArm::of(&self.world, arm, &strains)).collect()
     }
 }

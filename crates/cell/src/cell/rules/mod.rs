@@ -4,7 +4,7 @@
 //! | rule | when | what it does |
 //! |---|---|---|
 //! | [`force_guard`] | tissue pushes with nearly the scene's limit | shortens the command |
-//! | [`pierce`] | an instrument has gone through an organ's surface | disables its contact |
+//! | [`pierce`] | an instrument is inside an organ that it has not punctured | disables its contact |
 //! | [`overstretch`] | tissue near an instrument is strained beyond what tissue bears | disables contact |
 //! | [`reconnect`] | the instrument is out, and tissue has come back | enables contact again |
 //! | [`relax`] | an organ stays folded with no instrument at it | relaxes it outside of time |

@@ -12,6 +12,7 @@
 
 use super::scope::Scope;
 use super::strain::{MAX_LATCHED_STRETCH, MAX_WAIT_FRAMES};
+use crate::World;
 use crate::cell::arm::ArmUnit;
 use glam::DVec3;
 
@@ -22,22 +23,25 @@ const NEAR: f64 = 0.03;
 /// that holds, then the nearest.
 pub(super) fn instrument_at(scope: &Scope<'_>, organ: usize) -> Option<usize> {
     let at = scope.strains[organ].at;
-    let near = scope.arms.iter().enumerate().filter(|(_, s)| is_at(s, at, organ));
+    let near = scope.arms.iter().enumerate().filter(|(_, s)| is_at(scope.world, s, at, organ));
     let ranked = near.map(|(k, s)| (k, (s.holds(organ), s.distance(at))));
     ranked.min_by(|(_, a), (_, b)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))).map(|(k, _)| k)
 }
 
 /// Whether the instrument of `arm` may be the cause of a strain of `organ` at `place` (m).
-pub(super) fn is_at(arm: &ArmUnit, place: DVec3, organ: usize) -> bool {
-    !arm.state.contact_disabled && arm.meets_tissue() && (arm.distance(place) < NEAR || arm.holds(organ))
+pub(super) fn is_at(world: &World, arm: &ArmUnit, place: DVec3, organ: usize) -> bool {
+    let meets = arm.meets_tissue() || world.is_punctured(organ, arm.model.tools.gripper);
+    !arm.state.contact_disabled && meets && (arm.distance(place) < NEAR || arm.holds(organ))
 }
 
-/// Disables contact of arm `k` if it strains `organ` too much. Tissue that was just released has
-/// time to recover.
+/// Disables contact of arm `k` if it strains `organ` too much. Tissue that was just released or
+/// punctured has time to recover.
 pub(super) fn apply(scope: &mut Scope<'_>, organ: usize, k: usize) {
     let strain = scope.strains[organ];
     let left_behind = scope.arms.iter().any(|s| {
-        (s.state.contact_disabled || s.state.blades_disabled) && (s.distance(strain.at) < NEAR || s.holds(organ))
+        let punctured = scope.world.is_punctured(organ, s.model.tools.gripper);
+        (s.state.contact_disabled || s.state.blades_disabled || punctured)
+            && (s.distance(strain.at) < NEAR || s.holds(organ))
     });
     let patient = left_behind && scope.waits[organ] < MAX_WAIT_FRAMES && strain.stretch < MAX_LATCHED_STRETCH;
     if patient && strain.is_too_much() {

@@ -1,10 +1,10 @@
 //! Rule: contact of an instrument that has pierced an organ is disabled.
 //!
-//! Contact of tissue is at the vertices of its surface. A blade that presses hard can stretch a
-//! triangle so far that it passes between the vertices; from inside it would drag them along
-//! without limit. Real tissue would be pierced. So contact of an instrument is disabled when the
-//! axis of one of its convex parts is inside an organ, deeper than the part is thick. Held tissue
-//! may bulge round the jaws and does not count.
+//! An instrument that comes through the surface of an organ with less force than punctures it
+//! ([`crate::cell::period`]) got there because the mesh or the contact gave way, not tissue: a blade can
+//! crush a triangle within a frame. From inside, its contact would drag the surface along without
+//! limit. So contact of an instrument is disabled when the axis of one of its convex parts is inside
+//! an organ, deeper than the part is thick. Held tissue may bulge round the jaws and does not count.
 
 use super::scope::Scope;
 
@@ -14,9 +14,9 @@ pub(super) fn apply(scope: &mut Scope<'_>) {
         if !arm.meets_tissue() || arm.state.contact_disabled {
             continue;
         }
-        if let Some(organ) = arm.pierces(scope.world) {
+        if let Some((organ, _)) = arm.pierces(scope.world).first() {
             scope.log.rules.pierced += 1;
-            scope.disable_contact(k, organ);
+            scope.disable_contact(k, *organ);
         }
     }
 }

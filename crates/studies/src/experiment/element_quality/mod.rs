@@ -148,6 +148,7 @@ impl Case<'_> {
             peak_constraint_n: s.attached.then(|| peak_constraint(&made)),
             slipped: d.slipped,
             torn: s.torn > 0,
+            punctures: s.punctures,
             suspensions: [s.disabled_contacts, s.disabled_blades, s.relaxed],
         })
     }
@@ -185,6 +186,7 @@ mod tests {
                     peak_constraint_n: Some(0.4),
                     slipped: 0,
                     torn: false,
+                    punctures: 0,
                     suspensions: [0, 0, 0],
                 }));
             }

@@ -114,6 +114,7 @@ fn table(rows: &[&ElementQualityRow]) -> Table {
             ("Activation step (mm)", &|r| or_dash(r.activation_step_mm, 2)),
             ("Pull (N)", &|r| or_dash(r.peak_constraint_n, 2)),
             ("Held", &|r| yes_or_no(r.held)),
+            ("Punctures", &|r| count(r.punctures)),
             ("Suspensions", &|r| suspensions(r.suspensions)),
             ("Remarks", &|r| remarks(r.divergence.as_ref(), r.why.as_ref(), (r.slipped, r.torn), None)),
         ],

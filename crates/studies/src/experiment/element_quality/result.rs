@@ -49,6 +49,9 @@ pub struct ElementQualityRow {
     pub slipped: usize,
     /// Whether the tissue tore out.
     pub torn: bool,
+    /// Times that an instrument punctured an organ.
+    #[serde(default)]
+    pub punctures: usize,
     /// Suspensions: contacts disabled, contacts of blades disabled, organs relaxed.
     pub suspensions: [usize; 3],
 }

@@ -88,6 +88,7 @@ fn table_ii(r: &GraspDesignsResult, condition: Condition) -> Table {
         "Activation step (mm)",
         "Inverted",
         "Smallest volume",
+        "Punctures",
         "Suspensions",
     ];
     let range = |ends: Option<(f64, f64)>| match ends {
@@ -110,6 +111,7 @@ fn table_ii(r: &GraspDesignsResult, condition: Condition) -> Table {
             ),
             count(row.inverted_peak),
             fixed(row.min_volume_ratio, 2),
+            count(row.punctures),
             suspensions(row.suspensions),
         ]
     };
@@ -212,6 +214,7 @@ fn trials(r: &GraspDesignsResult) -> Section {
             ("Pull (N)", &|t| fixed(t.peak_constraint_n, 2)),
             ("Yielded", &|t| count(t.yielded_substeps)),
             ("Smallest volume", &|t| fixed(t.min_volume_ratio, 2)),
+            ("Punctures", &|t| count(t.punctures)),
             ("Suspensions", &|t| suspensions(t.suspensions)),
             ("Remarks", &|t| remarks(t.divergence.as_ref(), t.why.as_ref(), (t.slipped, t.torn), inverted(t))),
         ],

@@ -106,6 +106,9 @@ pub struct GraspTrial {
     pub slipped: usize,
     /// Whether the tissue tore out.
     pub torn: bool,
+    /// Times that an instrument punctured an organ.
+    #[serde(default)]
+    pub punctures: usize,
     /// Suspensions: contacts disabled, contacts of blades disabled, organs relaxed.
     pub suspensions: [usize; 3],
     /// Time since the grasp (s), lift of the jaws and of the tissue (mm).
@@ -145,6 +148,8 @@ pub struct GraspDesignRow {
     pub inverted_peak: usize,
     /// Smallest volume of an element over its volume at rest in any trial.
     pub min_volume_ratio: f64,
+    /// Times that an instrument punctured an organ, in all trials.
+    pub punctures: usize,
     /// Suspensions in all trials: contacts disabled, contacts of blades disabled, organs relaxed.
     pub suspensions: [usize; 3],
     /// The paper's row.
@@ -211,6 +216,7 @@ fn row(condition: Condition, design: GraspDesignName, regrasp: bool, trials: &[G
         follow_ratio_median: median_of(&|t| t.follow_ratio),
         inverted_peak: of.iter().map(|t| t.inverted_peak).max().unwrap_or(0),
         min_volume_ratio: of.iter().map(|t| t.min_volume_ratio).fold(1.0, f64::min),
+        punctures: of.iter().map(|t| t.punctures).sum(),
         suspensions: [sum(0), sum(1), sum(2)],
         paper: paper(design, regrasp),
     })
@@ -250,6 +256,7 @@ pub(crate) mod tests {
             peak_constraint_n: 0.2,
             slipped: 0,
             torn: false,
+            punctures: 0,
             suspensions: [0, 1, 0],
             lifts: vec![(0.0, 0.0, 0.0), (1.0, 15.0, 15.0 - value)],
         }

@@ -124,6 +124,7 @@ fn regrasp(lift: &LiftTrial, rules: bool, made: &Recording) -> Regrasp {
         steps: rcm_mm.len(),
         steps_over: rcm_mm.iter().filter(|mm| **mm > THRESHOLD_MM).count(),
         rcm_mm,
+        punctures: s.punctures,
         suspensions: [s.disabled_contacts, s.disabled_blades, s.relaxed],
         divergence: divergence(made),
     }
@@ -156,6 +157,7 @@ mod tests {
             steps: 2,
             steps_over: 1,
             rcm_mm: vec![0.1, 3.5],
+            punctures: 0,
             suspensions: [0, 1, 0],
             divergence: None,
         };

@@ -62,6 +62,7 @@ fn table(r: &PortRegraspResult) -> Table {
             ("Pull (N)", &|row| fixed(row.pull_n, 2)),
             ("Largest RCM deviation (mm)", &|row| fixed(row.rcm_peak_mm, 3)),
             (over.as_str(), &|row| format!("{} of {}", row.steps_over, row.steps)),
+            ("Punctures", &|row| row.punctures.to_string()),
             ("Suspensions", &|row| suspensions(row.suspensions)),
             ("Remarks", &|row| match &row.divergence {
                 Some(why) => why.clone(),

@@ -28,6 +28,9 @@ pub struct Regrasp {
     pub steps_over: usize,
     /// Largest deviation of either arm in each (mm).
     pub rcm_mm: Vec<f64>,
+    /// Times that an instrument punctured an organ.
+    #[serde(default)]
+    pub punctures: usize,
     /// Disabled contacts, disabled contacts of blades, relaxed organs.
     pub suspensions: [usize; 3],
     /// Why it diverged.

@@ -119,6 +119,7 @@ fn all(r: &RobustnessResult) -> Section {
             ("could not begin", &|(_, p)| count(p.refused)),
             ("diverged", &|(_, p)| count(p.diverged)),
             ("inverted", &|(_, p)| count(p.inverted_peak)),
+            ("punctures", &|(_, p)| count(p.punctures)),
             ("suspensions", &|(_, p)| p.suspensions.map(|n| n.to_string()).join("/")),
             ("why the first did not pass", &|(_, p)| p.why.clone().unwrap_or_default()),
         ],

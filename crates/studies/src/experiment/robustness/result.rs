@@ -21,6 +21,9 @@ pub struct PolicyOutcome {
     pub diverged: usize,
     /// Largest number of inverted elements in any frame.
     pub inverted_peak: usize,
+    /// Times that an instrument punctured an organ.
+    #[serde(default)]
+    pub punctures: usize,
     /// Suspensions: contacts disabled, contacts of blades disabled, organs relaxed.
     pub suspensions: [usize; 3],
     /// Episodes that could not begin, such as with a start out of reach.
@@ -41,6 +44,7 @@ impl PolicyOutcome {
         self.passed += usize::from(s.passed);
         self.diverged += usize::from(s.diverged);
         self.inverted_peak = self.inverted_peak.max(s.inverted_peak);
+        self.punctures += s.punctures;
         let suspended = [s.disabled_contacts, s.disabled_blades, s.relaxed];
         self.suspensions.iter_mut().zip(suspended).for_each(|(all, own)| *all += own);
         if !s.passed && self.why.is_none() {
