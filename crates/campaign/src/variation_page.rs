@@ -148,7 +148,7 @@ pub(super) fn episodes(records: &[EpisodeRecord]) -> String {
     let rows: Vec<Vec<String>> = records.iter().take(MAX_LISTED).map(row).collect();
     let note = if records.len() > MAX_LISTED { format!("the first {MAX_LISTED} of ") } else { String::new() };
     let title = format!("{note}{}", counted(records.len(), "episode"));
-    let lead = "What was drawn for each episode, and how it ended. Warnings: instruments that pierced an organ, \
+    let lead = "What was drawn for each episode, and how it ended. Warnings: punctures, instruments that pierced an organ, \
                 organs overstretched, organs that stayed folded. <code>table.csv</code> has all figures.";
     page::section("Episodes", lead, &page::fold(&title, &Table::new(head, rows).html()))
 }

@@ -158,6 +158,16 @@ impl World {
         self.stepper.forces()
     }
 
+    /// Force of the tissue of one organ on a tool in the last frame.
+    pub(crate) fn force_of(&self, organ: usize, tool: usize) -> ToolForce {
+        self.stepper.force_of(organ, tool)
+    }
+
+    /// Whether a `tool` is in a hole of an organ.
+    pub(crate) fn is_punctured(&self, organ: usize, tool: usize) -> bool {
+        self.state.holes.iter().any(|hole| hole.body == organ && hole.tools.contains(&tool))
+    }
+
     /// Events of grasps in the last frame.
     pub fn events(&self) -> &[Event] {
         self.stepper.events()

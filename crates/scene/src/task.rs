@@ -136,13 +136,22 @@ pub struct Safety {
     pub rcm_abort_mm: f64,
     /// Force of tissue on an instrument against which no command pushes it on (N).
     pub force_limit_n: f64,
+    /// An instrument that comes through the surface of an organ punctures it if it pressed on it
+    /// with at least this force (N).
+    pub puncture_force_n: f64,
     /// What the force guard watches; all by default.
     pub rules: SafetyRules,
 }
 
 impl Default for Safety {
     fn default() -> Self {
-        Self { rcm_threshold_mm: 3.0, rcm_abort_mm: 5.0, force_limit_n: 10.0, rules: SafetyRules::default() }
+        Self {
+            rcm_threshold_mm: 3.0,
+            rcm_abort_mm: 5.0,
+            force_limit_n: 10.0,
+            puncture_force_n: 10.0,
+            rules: SafetyRules::default(),
+        }
     }
 }
 

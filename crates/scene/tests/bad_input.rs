@@ -456,6 +456,11 @@ fn parts_fit() {
             "task.gates.cut_open is 0.1; it must be greater than cut_closed (0.15)",
         ),
         Case(
+            "puncture_force_n = 10.0",
+            "puncture_force_n = 0.0§",
+            "safety.puncture_force_n is 0; it must be in [0.1, 1000] N",
+        ),
+        Case(
             "rcm_abort_mm = 5.0",
             "rcm_abort_mm = 2.0§",
             "safety.rcm_abort_mm is 2; it must be greater than rcm_threshold_mm (3)",

@@ -176,7 +176,9 @@ row! {
         fallbacks,
         /// The tissue diverged.
         diverged,
-        /// Times that the axis of an instrument came into an organ in the period.
+        /// Times that an instrument punctured an organ in the period.
+        punctures,
+        /// Times that the axis of an instrument came into an organ with less force than punctures it.
         pierced,
         /// Times that an instrument began to strain tissue beyond what tissue bears.
         overstretched,

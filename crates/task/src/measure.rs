@@ -69,6 +69,7 @@ impl Subject {
             yielded: report.tissue.yielded_substeps as f64,
             fallbacks: report.tissue.fallbacks as f64,
             diverged: flag(report.tissue.divergence.is_some()),
+            punctures: report.rules.punctures as f64,
             pierced: report.rules.pierced as f64,
             overstretched: report.rules.overstretched as f64,
             folded: report.rules.folded as f64,

@@ -25,8 +25,11 @@ const VERSION: u32 = 4;
 /// What a column of this version was called in files of an earlier `version`. `None` for one that
 /// they do not have, which is read as zeros.
 fn name_in(version: u32, name: &str) -> Option<String> {
-    let tissue = ["pierced", "overstretched", "folded"];
-    if version < 4 && (name.ends_with("_pierces") || tissue.contains(&name)) || name.ends_with("_solid_n") {
+    let warnings = ["punctures", "pierced", "overstretched", "folded"];
+    if version < 4 && (name.ends_with("_pierces") || warnings.contains(&name)) {
+        return None;
+    }
+    if version < 3 && name.ends_with("_solid_n") {
         return None;
     }
     if version < 2 && (name.ends_with("_guarded") || name == "activation_step_mm") {

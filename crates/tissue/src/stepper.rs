@@ -111,19 +111,29 @@ impl Stepper {
         if let Some(why) = self.refusal(model, state, loads) {
             return StepReport { divergence: Some(why), ..StepReport::default() };
         }
-        let grasps = std::mem::take(&mut state.grasps);
+        let (grasps, holes) = (std::mem::take(&mut state.grasps), std::mem::take(&mut state.holes));
         let (dt, gravity) = (self.dt, model.gravity);
         let (colliders, tool_contact) = (&model.colliders[..], model.tool_contact);
         let single_thread = self.pool.is_none();
-        let frame =
-            Frame { dt, gravity, index: 0, grasps: &grasps, tools, loads, colliders, tool_contact, single_thread };
+        let frame = Frame {
+            dt,
+            gravity,
+            index: 0,
+            grasps: &grasps,
+            holes: &holes,
+            tools,
+            loads,
+            colliders,
+            tool_contact,
+            single_thread,
+        };
 
         self.solvers.begin_frame(state, &frame);
         self.solvers.build_islands(model, state, &frame);
         self.solvers.solve_islands(state, &frame, self.pool.as_ref());
         let report = self.solvers.end_frame(state);
 
-        state.grasps = grasps;
+        (state.grasps, state.holes) = (grasps, holes);
         if !matches!(report.divergence, Some(Divergence::NonFinite { .. })) {
             state.time += dt;
             self.sum_tool_forces(tools.len());
@@ -134,7 +144,7 @@ impl Stepper {
 
     /// Why a frame cannot be stepped, if it cannot.
     fn refusal(&self, model: &Model, state: &State, loads: &[Load]) -> Option<Divergence> {
-        if !self.solvers.fits(model, state) || !state.grasps_fit(model) {
+        if !self.solvers.fits(model, state) || !state.names_nodes_of(model) {
             return Some(Divergence::OtherModel);
         }
         (!loads.iter().all(|load| load.fits(model))).then_some(Divergence::WrongLoad)
@@ -174,6 +184,19 @@ impl Stepper {
         &self.forces
     }
 
+    /// Force of one body on a tool in the last frame; zero before the first one.
+    pub fn force_of(&self, body: usize, tool: usize) -> ToolForce {
+        let mut sum = ToolForce::default();
+        self.solvers.for_bodies(&mut |index, reaction, contacts| {
+            let contacts = contacts.filter(|_| index == body).map_or(&[][..], |contacts| contacts.forces());
+            let constraints = if index == body { reaction.forces() } else { &[] };
+            for part in [constraints, contacts] {
+                part.get(tool).into_iter().for_each(|force| sum.add(force));
+            }
+        });
+        sum
+    }
+
     /// How the force of tissue on `tools` changes when they move together, as one rigid body: about
     /// the point `about` (m), the wrench on them (N, N m) changes by minus this matrix times the
     /// motion (translation (m), rotation vector (rad)) of a frame.
@@ -188,7 +211,7 @@ impl Stepper {
     /// Zero with solvers other than [`SolverSettings::QuasiNewton`], which have no matrix.
     pub fn tool_stiffness(&mut self, model: &Model, state: &State, tools: &[usize], about: DVec3) -> [[f64; 6]; 6] {
         let mut sum = [[0.0; 6]; 6];
-        if self.solvers.fits(model, state) && state.grasps_fit(model) {
+        if self.solvers.fits(model, state) && state.names_nodes_of(model) {
             let group = ToolGroup { dt: self.dt, tools, about, grasps: &state.grasps, colliders: &model.colliders };
             self.solvers.add_tool_stiffness(&group, &mut sum);
         }

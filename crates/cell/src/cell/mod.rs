@@ -17,6 +17,7 @@ mod inside;
 mod link_poses;
 mod period;
 mod placed;
+mod pressed;
 mod reach;
 mod report;
 mod restart;
@@ -148,7 +149,7 @@ impl Cell {
         Ok(Self {
             motions: Vec::with_capacity(3 * arms.len()),
             edges: Edges::of(&world),
-            solids: Solids { bed, pinned },
+            solids: Solids { bed, pinned, holes: Vec::new() },
             contact,
             watches: vec![OrganWatch::default(); world.model.bodies().len()],
             touch: false,
@@ -202,9 +203,17 @@ impl Cell {
     }
 
     /// Whether the axis of an instrument's part lies inside an organ, by arm: privileged. Held tissue,
-    /// and tissue that blades shear, does not count.
+    /// tissue that blades shear, and organs in a hole of which the instrument is do not count.
     pub fn axes_inside(&self) -> Vec<bool> {
-        self.arms.iter().map(|arm| arm.pierces(&self.world).is_some()).collect()
+        self.arms.iter().map(|arm| !arm.pierces(&self.world).is_empty()).collect()
+    }
+
+    /// The organs in a hole of which the instrument of arm `k` is, by their bodies, in the order in
+    /// which it went into them; none if the arm does not exist.
+    pub fn punctured_by(&self, k: usize) -> Vec<usize> {
+        let tool = self.arms.get(k).map(|arm| arm.model.tools.gripper);
+        let holes = self.world.state.holes.iter().filter(|hole| tool.is_some_and(|tool| hole.tools.contains(&tool)));
+        holes.map(|hole| hole.body).collect()
     }
 
     /// Wall time since the cell was built.

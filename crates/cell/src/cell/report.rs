@@ -173,7 +173,23 @@ pub enum CellEvent {
         #[serde(skip_serializing_if = "Option::is_none")]
         parted: Option<Box<Severance>>,
     },
-    /// The axis of the instrument came into an organ that its jaws do not hold.
+    /// The instrument has punctured an organ: it came through the surface and had pressed on it with
+    /// at least the scene's `safety.puncture_force_n`. Around the hole it does not touch the organ
+    /// until it is out.
+    Punctured {
+        /// The arm.
+        arm: Side,
+        /// Name of the organ.
+        organ: String,
+        /// Organ coordinate of the hole.
+        s: f64,
+        /// Where the instrument's axis is inside the organ, in the cell (mm).
+        at_mm: [f64; 3],
+        /// The largest force with which it pressed on the organ in the last 0.1 s (N).
+        force_n: f64,
+    },
+    /// The axis of the instrument came into an organ that its jaws do not hold, with less force than
+    /// punctures it.
     Pierced {
         /// The arm.
         arm: Side,
@@ -245,6 +261,9 @@ impl std::fmt::Display for CellEvent {
             Self::Cut { arm, organ, pieces, work_mj, .. } => {
                 let into = if *pieces == 1 { "without parting it".to_owned() } else { format!("into {pieces} pieces") };
                 write!(f, "the {} blades cut the {organ} with {work_mj:.1} mJ, {into}", arm.name())
+            }
+            Self::Punctured { arm, organ, s, force_n, .. } => {
+                write!(f, "the {} instrument punctured the {organ} at s = {s:.2} with {force_n:.1} N", arm.name())
             }
             Self::Pierced { arm, organ } => write!(f, "the {} instrument has pierced the {organ}", arm.name()),
             Self::Overstretched { arm, organ, stretch, volume } => write!(

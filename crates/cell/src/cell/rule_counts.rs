@@ -7,7 +7,9 @@ use serde::Serialize;
 pub struct RuleCounts {
     /// Commands that the force guard shortened.
     pub guarded: usize,
-    /// Instruments whose axis came into an organ.
+    /// Instruments that punctured an organ.
+    pub punctures: usize,
+    /// Instruments whose axis came into an organ with less force than punctures it.
     pub pierced: usize,
     /// Organs that an instrument began to overstretch or crush.
     pub overstretched: usize,

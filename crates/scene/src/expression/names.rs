@@ -82,7 +82,7 @@ const ARM: [(&str, Kind); 40] = [
     ("solid_n", In(Unit::Newton)),
 ];
 
-const TASK: [(&str, Kind, Needs); 27] = [
+const TASK: [(&str, Kind, Needs); 28] = [
     ("grasp_distance_mm", In(Unit::Millimetre), Needs::GRASPER),
     ("grasped", Flag, Needs::GRASPER),
     ("grasp_s", In(Unit::None), Needs::GRASPER),
@@ -106,6 +106,7 @@ const TASK: [(&str, Kind, Needs); 27] = [
     ("yielded", In(Unit::None), Needs::NOTHING),
     ("fallbacks", In(Unit::None), Needs::NOTHING),
     ("diverged", Flag, Needs::NOTHING),
+    ("punctures", In(Unit::None), Needs::NOTHING),
     ("pierced", In(Unit::None), Needs::NOTHING),
     ("overstretched", In(Unit::None), Needs::NOTHING),
     ("folded", In(Unit::None), Needs::NOTHING),

@@ -66,7 +66,8 @@ pub struct RandomActionsRow {
     /// Way of both tips (m).
     #[serde(default)]
     pub path_m: f64,
-    /// Actions after which an instrument's axis was inside an organ, over both arms.
+    /// Actions after which an instrument's axis was inside an organ that it had not punctured, over
+    /// both arms.
     #[serde(default)]
     pub axes_inside: usize,
     /// What was beyond what tissue bears.
@@ -90,7 +91,8 @@ pub struct RandomActionsResult {
     pub suspensions_per_1000_actions: f64,
     /// What was beyond what tissue bears, in 1,000 actions.
     pub warnings_per_1000_actions: f64,
-    /// Actions after which an instrument's axis was inside an organ, of all seeds.
+    /// Actions after which an instrument's axis was inside an organ that it had not punctured, of all
+    /// seeds.
     pub axes_inside: usize,
     /// What was beyond what tissue bears, in all seeds.
     #[serde(flatten)]
@@ -229,7 +231,8 @@ fn joint_limits_broken(cell: &Cell) -> Result<usize> {
 
 fn document(r: &RandomActionsResult) -> Document {
     let lead = format!(
-        "Random valid actions in the cell of {}, from {} seeds. No rule switches physics off. \
+        "Random valid actions in the cell of {}, from {} seeds. An instrument that comes through the surface of an \
+         organ with the scene's force punctures it. No rule switches physics off. \
          What is beyond what tissue bears is counted.",
         page::escape(&r.scene),
         r.rows.len()
@@ -241,7 +244,8 @@ fn document(r: &RandomActionsResult) -> Document {
         Card::new("Seeds without failure", format!("{good} of {}", r.rows.len()), "no divergence, no inverted element")
             .met(good == r.rows.len()),
         Card::new("Warnings", fixed(r.warnings_per_1000_actions, 2), "in 1,000 actions: beyond what tissue bears"),
-        Card::new("Axes inside organs", count(r.axes_inside), "actions after which one is inside")
+        Card::new("Punctures", count(r.warnings.punctures), "organs punctured by instruments"),
+        Card::new("Axes inside organs", count(r.axes_inside), "actions after which one is inside without a puncture")
             .met(r.axes_inside == 0),
         Card::new("Joints beyond their limits", count(broken), "over all actions").met(broken == 0),
     ];
@@ -258,6 +262,7 @@ fn document(r: &RandomActionsResult) -> Document {
             ("Force (N)", &|row| fixed(row.force_max_n, 2)),
             ("Way (m)", &|row| fixed(row.path_m, 2)),
             ("Actions with an axis inside", &|row| count(row.axes_inside)),
+            ("Punctures", &|row| count(row.warnings.punctures)),
             ("Pierced", &|row| count(row.warnings.pierced)),
             ("Overstretched", &|row| count(row.warnings.overstretched)),
             ("Folded", &|row| count(row.warnings.folded)),

@@ -9,6 +9,7 @@ mod contact_set;
 mod coupling;
 mod feature_contacts;
 mod force;
+mod hole_vertices;
 mod hull;
 mod members;
 mod memory;

@@ -5,7 +5,7 @@ use super::{Piece, Severed};
 use crate::builder::{Inherited, lay_out};
 use crate::contact::Anchor;
 use crate::state::{BodyState, WarmStart};
-use crate::{Body, BodyDescription, Compliance, Grasp, MassFloor, Model, State};
+use crate::{Body, BodyDescription, Compliance, Grasp, Hole, MassFloor, Model, State};
 use trocar_geometry::TetMesh;
 
 /// A mass this many times the weight of the volume around a node was raised to the floor; less is
@@ -65,6 +65,14 @@ pub(super) fn carry(model: &Model, state: &State, index: usize, split: &Split) -
             hands.share_out(grasp, &mut moved.grasps);
         } else {
             moved.grasps.push(grasp.clone());
+        }
+    }
+    moved.holes.clear();
+    for hole in &state.holes {
+        if hole.body == index {
+            hands.follow(hole, &mut moved.holes);
+        } else {
+            moved.holes.push(hole.clone());
         }
     }
     Severed { model: after, state: moved, faces: split.faces, pieces }
@@ -187,7 +195,7 @@ fn filter(filtered: &mut Vec<[usize; 2]>, whole: usize, pieces: std::ops::Range<
     filtered.sort_unstable();
 }
 
-/// Distributes grasps among the pieces.
+/// Distributes grasps and holes among the pieces.
 struct Hands<'a> {
     split: &'a Split,
     /// By new node: the number of its piece and its node there.
@@ -197,6 +205,18 @@ struct Hands<'a> {
 }
 
 impl Hands<'_> {
+    /// Appends a hole for each piece that has nodes of `hole`.
+    fn follow(&self, hole: &Hole, to: &mut Vec<Hole>) {
+        let mut nodes: Vec<Vec<u32>> = vec![Vec::new(); self.pieces.len()];
+        for i in hole.nodes.iter().flat_map(|node| self.split.copies(*node)) {
+            nodes[self.group[i as usize]].push(self.place[i as usize]);
+        }
+        for (piece, mut nodes) in self.pieces.iter().zip(nodes).filter(|(_, nodes)| !nodes.is_empty()) {
+            nodes.sort_unstable();
+            to.push(Hole { body: piece.body, tools: hole.tools.clone(), nodes });
+        }
+    }
+
     /// Appends a grasp for each piece of which `grasp` holds nodes.
     fn share_out(&self, grasp: &Grasp, to: &mut Vec<Grasp>) {
         let mut off_the_cut = vec![false; self.split.before];

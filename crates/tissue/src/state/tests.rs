@@ -5,7 +5,7 @@
 use super::State;
 use super::body_state::{BodyState, Repair, WarmStart};
 use crate::contact::{Anchor, FeatureAnchor, Source, Stretch};
-use crate::{BodyDescription, Compliance, ConstitutiveModel, Grasp, Material, Model, ModelBuilder};
+use crate::{BodyDescription, Compliance, ConstitutiveModel, Grasp, Hole, Material, Model, ModelBuilder};
 use glam::{DVec3, Vec3A};
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
@@ -51,6 +51,7 @@ fn full(model: &Model) -> State {
     };
     let grasp = Grasp::capture(model, &state, 0, &[0, 3], 1, &Pose::IDENTITY).compliant(compliance);
     state.grasps.push(grasp);
+    state.holes.push(Hole { body: 1, tools: vec![2], nodes: vec![3, 5] });
     state
 }
 
@@ -135,11 +136,16 @@ fn grasp_changes(grasp: &Grasp) -> Vec<Change> {
 fn hash_and_copies_carry_every_number() {
     let model = model();
     let state = full(&model);
-    let State { time: _, grasps, bodies } = &state;
+    let State { time: _, grasps, holes, bodies } = &state;
+    let Hole { body: _, tools: _, nodes: _ } = &holes[0];
     let mut changes = body_changes(&bodies[0]);
     let of_body = changes.len();
     changes.extend(grasp_changes(&grasps[0]));
     changes.push(change(|s| s.time += 1.0));
+    changes.push(change(|s| s.holes[0].body += 1));
+    changes.push(change(|s| s.holes[0].tools[0] += 1));
+    changes.push(change(|s| s.holes[0].nodes[1] += 1));
+    changes.push(change(|s| s.holes.clear()));
     let mut hashes = vec![state.hash()];
     for (k, change) in changes.iter().enumerate() {
         let mut changed = state.clone();

@@ -3,6 +3,7 @@
 use super::ArmModel;
 use crate::bite::Bite;
 use crate::cell::exchange::Exchange;
+use crate::cell::pressed::Pressed;
 use crate::cell::rules::ForceGuard;
 use crate::cell::setpoint::Setpoint;
 use crate::cell::solid::SolidLoad;
@@ -54,6 +55,7 @@ pub(crate) struct ArmState {
     pub exchange: Exchange,
     /// The force of solids.
     pub solid: SolidLoad,
+    pub pressed: Pressed,
     pub forces: [ToolForce; 3],
     pub scissors: Scissors,
     /// Angle of a cutter's blades (rad) before they began to close through tissue. Such blades
@@ -121,6 +123,7 @@ impl ArmState {
             jaw_rate: 0.0,
             exchange: Exchange::new(pose.translation),
             solid: SolidLoad::default(),
+            pressed: Pressed::default(),
             forces: [ToolForce::default(); 3],
             scissors,
             shears: None,
@@ -149,6 +152,7 @@ impl ArmState {
             jaw_rate,
             exchange,
             solid,
+            pressed,
             forces,
             scissors,
             shears,
@@ -193,6 +197,7 @@ impl ArmState {
             all.push(f64::from(*standing));
         }
         all.extend(solid.numbers());
+        all.extend(pressed.numbers());
         all.extend(bite.iter().flat_map(Bite::numbers));
         all.extend(parting.iter().flat_map(Parting::numbers));
         all

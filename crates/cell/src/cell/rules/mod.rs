@@ -3,7 +3,7 @@
 //! | module | when | what it does |
 //! |---|---|---|
 //! | [`force_guard`] | tissue pushes with nearly the scene's limit, or is strained or hit fast | shortens the command, stops the arm |
-//! | [`pierce`] | the axis of an instrument is inside an organ | counts, reports an event |
+//! | [`pierce`] | the axis of an instrument is inside an organ that it has not punctured | counts, reports an event |
 //! | [`overstretch`] | tissue near an instrument is strained beyond what tissue bears | the same |
 //! | [`fold`] | an organ stays strained with no instrument at it | the same |
 //!

@@ -10,6 +10,7 @@
 
 use super::OrganWatch;
 use super::strain::Strain;
+use crate::World;
 use crate::cell::arm::ArmUnit;
 use crate::cell::report::{CellEvent, PeriodLog};
 use glam::DVec3;
@@ -20,15 +21,16 @@ const NEAR: f64 = 0.03;
 
 /// The arm whose instrument is at the strained part of `organ`: one that only presses before one
 /// that holds, then the nearest.
-pub(super) fn instrument_at(arms: &[ArmUnit], strain: &Strain, organ: usize) -> Option<Side> {
-    let near = arms.iter().filter(|arm| is_at(arm, strain.at, organ));
+pub(super) fn instrument_at(world: &World, arms: &[ArmUnit], strain: &Strain, organ: usize) -> Option<Side> {
+    let near = arms.iter().filter(|arm| is_at(world, arm, strain.at, organ));
     let ranked = near.map(|arm| (arm.model.side, (arm.holds(organ), arm.distance(strain.at))));
     ranked.min_by(|(_, a), (_, b)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))).map(|(side, _)| side)
 }
 
 /// Whether the instrument of `arm` may be the cause of a strain of `organ` at `place` (m).
-pub(super) fn is_at(arm: &ArmUnit, place: DVec3, organ: usize) -> bool {
-    arm.meets_tissue() && (arm.distance(place) < NEAR || arm.holds(organ))
+pub(super) fn is_at(world: &World, arm: &ArmUnit, place: DVec3, organ: usize) -> bool {
+    let meets = arm.meets_tissue() || world.is_punctured(organ, arm.model.tools.gripper);
+    meets && (arm.distance(place) < NEAR || arm.holds(organ))
 }
 
 /// Counts tissue at the instrument of `arm` that is strained too much.

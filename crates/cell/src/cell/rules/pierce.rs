@@ -1,7 +1,8 @@
 //! Warns of an instrument that has pierced an organ: the axis of one of its convex parts is inside.
 //!
-//! Contact keeps tissue outside of an instrument's axis up to the forces that arms exert. Held
-//! tissue may bulge round the jaws and does not count, nor does what blades shear.
+//! Contact keeps tissue outside of an instrument's axis, and an instrument that presses harder than
+//! tissue bears punctures it. What comes in with less force did so because the mesh or the contact
+//! gave way. Held tissue may bulge round the jaws and does not count, nor does what blades shear.
 
 use crate::World;
 use crate::cell::arm::ArmUnit;
@@ -9,7 +10,8 @@ use crate::cell::report::{CellEvent, PeriodLog};
 
 pub(super) fn warn(world: &World, arms: &mut [ArmUnit], log: &mut PeriodLog) {
     for arm in arms {
-        let organ = if arm.state.pierces || arm.meets_tissue() { arm.pierces(world) } else { None };
+        let near = arm.state.pierces || arm.meets_tissue();
+        let organ = if near { arm.pierces(world).first().map(|(organ, _)| *organ) } else { None };
         if let Some(organ) = organ.filter(|_| !arm.state.pierces) {
             log.rules.pierced += 1;
             let organ = world.model.bodies()[organ].name().to_owned();

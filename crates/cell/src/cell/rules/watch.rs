@@ -39,13 +39,13 @@ impl Cell {
         self.watches.resize(strains.len(), OrganWatch::default());
         for (organ, strain) in strains.iter().enumerate() {
             let (name, watch) = (self.world.model.bodies()[organ].name(), &mut self.watches[organ]);
-            let arm = overstretch::instrument_at(&self.arms, strain, organ);
+            let arm = overstretch::instrument_at(&self.world, &self.arms, strain, organ);
             overstretch::warn(arm, strain, name, watch, log);
             fold::warn(arm, strain, name, watch, log);
         }
         if !self.strain_guard {
             return none;
         }
-        self.arms.iter().map(|arm| TissueAtArm::of(arm, &strains)).collect()
+        self.arms.iter().map(|arm| TissueAtArm::of(&self.world, arm, &strains)).collect()
     }
 }

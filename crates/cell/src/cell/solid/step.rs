@@ -66,7 +66,11 @@ impl Solids {
         }
         for k in 0..arms.len() {
             if arms[k].is_ideal() {
-                let own = self.force_at(arms, k, arms[k].drive.tip(), false);
+                let tip = arms[k].drive.tip();
+                for meeting in self.still(&arms[k], &arms[k].rods_at(tip)) {
+                    arms[k].state.pressed.add(&meeting, Spring::at(meeting.gap, meeting.room).force());
+                }
+                let own = self.force_at(arms, k, tip, false);
                 arms[k].state.solid.add(own + given[k].force);
             }
         }
@@ -85,7 +89,8 @@ impl Solids {
         let shaft_only = arm.state.shears.is_some();
         let felt = |rod: &&Rod| !shaft_only || rod.part == 0;
         let mut deepest = Deepest::default();
-        self.pinned.meet(&rods.iter().filter(felt).copied().collect::<Vec<_>>(), &mut deepest);
+        let rods: Vec<Rod> = rods.iter().filter(felt).copied().collect();
+        self.pinned.meet(&rods, &self.holes, arm.model.tools.gripper, &mut deepest);
         found.extend(deepest.into_iter());
         found
     }
@@ -178,6 +183,7 @@ impl Solids {
         for ((meeting, other), obstacle) in found.iter().zip(&obstacles) {
             let force = obstacle.force * meeting.normal;
             sum += force;
+            arms[k].state.pressed.add(meeting, obstacle.force);
             if let Some(j) = other {
                 given[*j] += Wrench { force: -force, torque: meeting.point.cross(-force) };
             }
