@@ -5,8 +5,9 @@
 //! [`LatticeOptions::fill`](crate::LatticeOptions), on the Gauss points of the whole cell.
 
 use crate::Hexahedron;
+use crate::flow::Flow;
 use crate::material::{Material, Part, Principal};
-use crate::symmetric::Svd;
+use crate::symmetric::{Svd, nearest_rotation};
 use glam::{DMat3, DVec3};
 
 /// Offset of Gauss's two points from the middle of a side, over the side.
@@ -90,6 +91,59 @@ impl Element<'_> {
                 for b in 0..=a {
                     let Some(to) = to.next() else { return };
                     *to += svd.u * stiffness(&law, turned[a], turned[b]) * svd.u.transpose() * volume;
+                }
+            }
+        }
+    }
+
+    /// Energy (J) and its gradient by each node's position (N), the viscous part included if the
+    /// strains before are given. The same as [`Self::evaluate`], without singular values.
+    pub fn forces(&self, x: &[DVec3; 8], before: Option<(&Flow, &[DMat3; 8])>) -> (f64, [DVec3; 8]) {
+        let (mut energy, mut gradient, mut point) = (0.0, [DVec3::ZERO; 8], 0);
+        self.for_points(|u, volume, part| {
+            let gradients = shape_gradients(u).map(|g| g / self.cell);
+            let f = deformation(x, &gradients);
+            let (mut density, mut stress) = self.material.stress(part, f);
+            if let (Some((flow, before)), Part::Deviatoric) = (before, part) {
+                // The points of the fill come later; they have no viscosity.
+                if let Some(before) = before.get(point) {
+                    let viscous = flow.stress(f, before);
+                    (density, stress) = (density + viscous.0, stress + viscous.1);
+                }
+                point += 1;
+            }
+            energy += volume * density;
+            for (to, g) in gradient.iter_mut().zip(&gradients) {
+                *to += volume * (stress * *g);
+            }
+        });
+        (energy, gradient)
+    }
+
+    /// C = F'F at the points of the tissue's deviatoric part.
+    pub fn green(&self, x: &[DVec3; 8]) -> [DMat3; 8] {
+        CORNERS.map(|corner| {
+            let f = deformation(x, &shape_gradients(self.hex.centre + self.hex.spread * corner).map(|g| g / self.cell));
+            f.transpose() * f
+        })
+    }
+
+    /// The rotation of the cell's middle.
+    pub fn rotation(&self, x: &[DVec3; 8]) -> DMat3 {
+        nearest_rotation(deformation(x, &shape_gradients(DVec3::splat(0.5)).map(|g| g / self.cell)))
+    }
+
+    /// Adds the stiffness of viscosity.
+    pub fn add_viscous(&self, x: &[DVec3; 8], flow: &Flow, blocks: &mut Blocks) {
+        let volume = self.hex.fraction * self.cell.powi(3) / 8.0;
+        for corner in CORNERS {
+            let gradients = shape_gradients(self.hex.centre + self.hex.spread * corner).map(|g| g / self.cell);
+            let f = deformation(x, &gradients);
+            let mut to = blocks.iter_mut();
+            for a in 0..8 {
+                for b in 0..=a {
+                    let Some(to) = to.next() else { return };
+                    *to += flow.block(f, gradients[a], gradients[b]) * volume;
                 }
             }
         }
