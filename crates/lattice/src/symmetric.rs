@@ -96,7 +96,7 @@ impl Svd {
 const MAX_POLAR_STEPS: usize = 12;
 
 /// A step that changes so little (squared) is followed by rounding only.
-const POLAR_TOLERANCE: f64 = 1e-18;
+const POLAR_TOLERANCE: f64 = 1e-14;
 
 /// Determinant, over the cube of the norm, below which singular values are taken.
 const POLAR_MIN_VOLUME: f64 = 1e-3;

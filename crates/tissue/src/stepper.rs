@@ -230,8 +230,8 @@ impl Stepper {
     }
 }
 
-/// The solvers of these settings. Of a lattice they are one method, which takes only the number of
-/// substeps from them.
+/// The solvers of these settings. Those of lattices are one method, which takes substeps and tolerances
+/// from them.
 fn solvers(backend: Backend, settings: SolverSettings, dt: f64) -> Box<dyn SolverSet> {
     if let Backend::Lattice(_) = backend {
         return Box::new(BodySolvers::new(move |body, _| LatticeSolver::new(settings, body)));

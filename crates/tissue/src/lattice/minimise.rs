@@ -6,7 +6,7 @@
 //! again from the projected second derivative. Everything is in double precision and in a fixed
 //! order: the bits depend on nothing but the states at the frame's beginning.
 
-use super::system::Lattice;
+use super::system::{Elastic, Lattice};
 use super::terms::Term;
 use glam::DVec3;
 
@@ -57,19 +57,33 @@ pub(super) struct Island<'a> {
     pub terms: Vec<Term>,
     /// Positions of the nodes of the lattice of each body (m); none of bodies that cannot move.
     pub x: Vec<Vec<DVec3>>,
+    pub precision: Precision,
 }
 
 /// Energy and gradient at some positions.
 struct Value {
     energy: f64,
     gradient: Vec<Vec<DVec3>>,
+    /// Without the terms, by body.
+    elastic: Vec<Elastic>,
+}
+
+/// When a search ends.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Precision {
+    /// A step this small ends it (m).
+    pub tolerance: f64,
+    /// A step this small over the way so far ends it, too.
+    pub relative: f64,
 }
 
 impl Island<'_> {
     /// Moves the lattices to the minimum of the potential.
     pub fn minimise(&mut self) -> Outcome {
         self.update_limits();
-        let mut value = self.evaluate(&self.x);
+        let start = self.x.clone();
+        let first = self.lattices.iter().map(|lattice| lattice.first_elastic(&self.x[lattice.member])).collect();
+        let mut value = self.with_terms(&self.x, first);
         let mut pairs: Vec<Pair> = Vec::new();
         let (mut outcome, mut of_factor, mut projected) = (Outcome::default(), 0, false);
         loop {
@@ -103,6 +117,7 @@ impl Island<'_> {
             };
             let step = scaled(&direction, share);
             let change = difference(&next.gradient, &value.gradient);
+            let reached = longest(&direction);
             let curvature = dot(&step, &change);
             if curvature > 1e-10 * (dot(&step, &step) * dot(&change, &change)).sqrt() {
                 if pairs.len() == MEMORY {
@@ -113,7 +128,12 @@ impl Island<'_> {
             self.x = x;
             outcome.steps += 1;
             of_factor += 1;
-            value = if self.update_limits() { self.evaluate(&self.x) } else { next };
+            value = if self.update_limits() { self.with_terms(&self.x, next.elastic) } else { next };
+            let way = longest(&difference(&self.x, &start));
+            if share == 1.0 && reached <= self.precision.tolerance.max(self.precision.relative * way) {
+                outcome.converged = true;
+                return outcome;
+            }
         }
     }
 
@@ -129,15 +149,26 @@ impl Island<'_> {
         changed
     }
 
-    fn evaluate(&self, x: &[Vec<DVec3>]) -> Value {
-        let mut gradient: Vec<Vec<DVec3>> = x.iter().map(|x| vec![DVec3::ZERO; x.len()]).collect();
+    /// Energy and gradient at `x`, which is `direction` away from where `before` was.
+    fn evaluate(&self, x: &[Vec<DVec3>], direction: &[Vec<DVec3>], before: &Value) -> Value {
+        let elastic = self.lattices.iter().zip(&before.elastic).map(|(lattice, before)| {
+            let moves = direction[lattice.member].iter().any(|d| *d != DVec3::ZERO);
+            if moves { lattice.elastic(&x[lattice.member]) } else { before.clone() }
+        });
+        self.with_terms(x, elastic.collect())
+    }
+
+    /// Adds the terms at `x` to the elastic part.
+    fn with_terms(&self, x: &[Vec<DVec3>], elastic: Vec<Elastic>) -> Value {
+        let mut gradient: Vec<Vec<DVec3>> = vec![Vec::new(); x.len()];
         let mut energy = 0.0;
-        for lattice in &self.lattices {
-            energy += lattice.evaluate(&x[lattice.member], &mut gradient[lattice.member]);
+        for (lattice, elastic) in self.lattices.iter().zip(&elastic) {
+            gradient[lattice.member].clone_from(&elastic.gradient);
+            energy += elastic.energy;
         }
         let x: Vec<&[DVec3]> = x.iter().map(|x| &x[..]).collect();
         energy += self.terms.iter().map(|term| term.add_gradient(&x, &mut gradient)).sum::<f64>();
-        Value { energy, gradient }
+        Value { energy, gradient, elastic }
     }
 
     /// Whether the forces of every body are in balance.
@@ -179,7 +210,7 @@ impl Island<'_> {
         for _ in 0..MAX_HALVINGS {
             let mut x = self.x.clone();
             add(&mut x, share, direction);
-            let next = self.evaluate(&x);
+            let next = self.evaluate(&x, direction, value);
             let lower = next.energy <= value.energy + ARMIJO * share * slope;
             // Near the minimum energies differ by less than their rounding; gradients still tell.
             let same = (next.energy - value.energy).abs() <= ROUNDING * value.energy.abs();
@@ -196,6 +227,11 @@ impl Island<'_> {
 fn balanced(lattice: &Lattice<'_>, gradient: &[DVec3]) -> bool {
     let tolerance = TOLERANCE * EARTH * lattice.mass;
     gradient.iter().map(|g| g.length_squared()).sum::<f64>() <= tolerance * tolerance
+}
+
+/// Length of the longest vector.
+fn longest(vectors: &[Vec<DVec3>]) -> f64 {
+    vectors.iter().flatten().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt()
 }
 
 fn dot(a: &[Vec<DVec3>], b: &[Vec<DVec3>]) -> f64 {

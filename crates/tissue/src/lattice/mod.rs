@@ -19,9 +19,9 @@ use crate::body_slot::{BodySlot, IslandFrame, Solver};
 use crate::contact::ContactSet;
 use crate::frame::Frame;
 use crate::state::Repair;
-use crate::{Body, SolverSettings, ToolForce};
+use crate::{Body, QuasiNewton, SolverSettings, ToolForce};
 use glam::DVec3;
-use minimise::Island;
+use minimise::{Island, Precision};
 use system::{Lattice, LatticeSystem};
 use terms::{Place, Share, Term};
 use trocar_core::Wrench;
@@ -34,6 +34,7 @@ const HOLD_STIFFNESS: f64 = 1e4;
 /// The lattice solver of one body.
 pub(crate) struct LatticeSolver {
     substeps: usize,
+    precision: Precision,
     /// None if the body cannot move.
     system: Option<LatticeSystem>,
     contacts: ContactSet,
@@ -59,8 +60,13 @@ struct Held {
 impl LatticeSolver {
     /// For `body`.
     pub fn new(settings: SolverSettings, body: &Body) -> Self {
+        let precision = match settings {
+            SolverSettings::QuasiNewton(QuasiNewton { tolerance, relative, .. }) => Precision { tolerance, relative },
+            SolverSettings::Descent(_) => Precision { tolerance: 3e-8, relative: 1e-2 },
+        };
         Self {
             substeps: settings.substeps(),
+            precision,
             system: body.lattice.as_deref().map(LatticeSystem::new),
             contacts: ContactSet::new(body),
             held: Vec::new(),
@@ -136,11 +142,12 @@ impl Solver for LatticeSolver {
         let first_held = terms.len();
         slots.iter().enumerate().for_each(|(member, slot)| hold(slot, member, frame, to, &mut terms));
 
+        let precision = slots[0].solver.precision;
         let starts: Vec<Start> = slots.iter().map(|slot| Start::of(slot, frame, h)).collect();
         let x = starts.iter().map(|start| start.guess.clone()).collect();
         let lattices = slots.iter_mut().zip(&starts).enumerate();
         let lattices = lattices.filter_map(|(member, (slot, start))| lattice(slot, member, start, h)).collect();
-        let mut search = Island { lattices, terms, x };
+        let mut search = Island { lattices, terms, x, precision };
         let outcome = search.minimise();
         let Island { terms, x, .. } = search;
 
@@ -217,7 +224,10 @@ impl Start {
         if flies {
             start.guess.clone_from(&start.predictor);
         } else {
-            start.guess.extend(nodes().map(|(x, v)| *x + h * *v));
+            // A body that hardly moves starts where it is, and may come to rest.
+            let fastest = lattice.velocities.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
+            let share = if h * fastest > solver.precision.tolerance { h } else { 0.0 };
+            start.guess.extend(nodes().map(|(x, v)| *x + share * *v));
         }
         start
     }
@@ -236,10 +246,12 @@ impl Start {
 fn lattice<'a>(slot: &'a mut BodySlot<LatticeSolver>, member: usize, start: &Start, h: f64) -> Option<Lattice<'a>> {
     let BodySlot { body, solver, state, .. } = slot;
     let (embedding, system, state) = (body.lattice.clone()?, solver.system.as_mut()?, state.lattice.as_ref()?);
-    system.begin_substep(&embedding, body.material.viscosity, h, state);
-    let mass = embedding.body.masses().iter().sum();
+    let (mass, viscosity) = (embedding.body.masses().iter().sum(), body.material.viscosity);
     let (predictor, loads) = (start.predictor.clone(), start.loads.clone());
-    Some(Lattice { member, embedding, system, h, predictor, loads, mass })
+    let from = state.positions.clone();
+    let mut lattice = Lattice { member, embedding, system, h, predictor, loads, mass, viscosity, start: from };
+    lattice.begin_substep(&start.guess);
+    Some(lattice)
 }
 
 /// Appends the springs of rigidly held vertices, whose tools are where they are when `share` of the

@@ -4,7 +4,7 @@
 use super::embedding::{Embedding, EmbeddingData};
 use super::terms::Term;
 use glam::{DMat3, DVec3};
-use trocar_lattice::{BodyState, Flow};
+use trocar_lattice::Flow;
 use trocar_sparse::{BlockMatrix, Cholesky, Level};
 
 /// Shifts of the diagonal that are tried, over its mean, if rounding makes the matrix singular.
@@ -22,8 +22,11 @@ pub(super) struct Lattice<'a> {
     pub predictor: Vec<DVec3>,
     /// Forces on the nodes (N).
     pub loads: Vec<DVec3>,
-    /// Mass (kg).
+    /// Mass (kg), and shear viscosity (Pa s).
     pub mass: f64,
+    pub viscosity: f64,
+    /// Where the nodes begin (m).
+    pub start: Vec<DVec3>,
 }
 
 /// Matrix and factor of a lattice. The factor never outlives a frame.
@@ -32,7 +35,28 @@ pub(super) struct LatticeSystem {
     cholesky: Cholesky<f64>,
     numbers: Vec<f64>,
     factorised: bool,
-    pub flow: Flow,
+    flow: Flow,
+    /// Whether `flow` is that of the substep.
+    flows: bool,
+    /// The elastic part where the last substep began: of a body at rest nothing else is needed.
+    known: Option<Known>,
+}
+
+/// Elastic energy (J) and its gradient (N), with inertia, viscosity, pins and loads.
+#[derive(Clone, Debug)]
+pub(super) struct Elastic {
+    pub energy: f64,
+    pub gradient: Vec<DVec3>,
+}
+
+/// An elastic part and all that it depends on.
+struct Known {
+    h: f64,
+    start: Vec<DVec3>,
+    predictor: Vec<DVec3>,
+    loads: Vec<DVec3>,
+    x: Vec<DVec3>,
+    elastic: Elastic,
 }
 
 impl LatticeSystem {
@@ -41,7 +65,15 @@ impl LatticeSystem {
         let matrix = embedding.body.stiffness_pattern();
         let rest = embedding.body.lattice().nodes();
         let cholesky = Cholesky::new(&matrix, rest);
-        Self { matrix, cholesky, numbers: vec![0.0; 3 * rest.len()], factorised: false, flow: Flow::default() }
+        Self {
+            matrix,
+            cholesky,
+            numbers: vec![0.0; 3 * rest.len()],
+            factorised: false,
+            flow: Flow::default(),
+            flows: false,
+            known: None,
+        }
     }
 
     /// The next preconditioning makes a new factor.
@@ -53,16 +85,48 @@ impl LatticeSystem {
     pub fn has_factor(&self) -> bool {
         self.factorised
     }
-
-    /// Begins a substep of `h` (s).
-    pub fn begin_substep(&mut self, embedding: &EmbeddingData, viscosity: f64, h: f64, state: &BodyState) {
-        self.flow.begin(&embedding.body, viscosity, h, &state.positions);
-    }
 }
 
 impl Lattice<'_> {
+    /// Begins a substep whose search starts at `x`.
+    pub fn begin_substep(&mut self, x: &[DVec3]) {
+        self.system.flows = false;
+        let known = self.system.known.as_ref().is_some_and(|known| {
+            known.h == self.h
+                && known.start == self.start
+                && known.predictor == self.predictor
+                && known.loads == self.loads
+                && known.x == x
+        });
+        if !known {
+            self.flow();
+            let elastic = self.elastic(x);
+            let (start, predictor, loads) = (self.start.clone(), self.predictor.clone(), self.loads.clone());
+            self.system.known = Some(Known { h: self.h, start, predictor, loads, x: x.to_vec(), elastic });
+        }
+    }
+
+    /// The elastic part where the search starts, at `x`.
+    pub fn first_elastic(&self, x: &[DVec3]) -> Elastic {
+        self.system.known.as_ref().map_or_else(|| self.elastic(x), |known| known.elastic.clone())
+    }
+
+    /// Makes the viscosity that of the substep.
+    fn flow(&mut self) {
+        if !std::mem::replace(&mut self.system.flows, true) {
+            self.system.flow.begin(&self.embedding.body, self.viscosity, self.h, &self.start);
+        }
+    }
+
+    /// The elastic part at `x`.
+    pub fn elastic(&self, x: &[DVec3]) -> Elastic {
+        let mut gradient = vec![DVec3::ZERO; x.len()];
+        let energy = self.evaluate(x, &mut gradient);
+        Elastic { energy, gradient }
+    }
+
     /// Energy at `x` (J); adds its gradient (N).
-    pub fn evaluate(&self, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
+    fn evaluate(&self, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
         let lattice = &self.embedding.body;
         let mut energy = lattice.add_elastic(x, &self.system.flow, gradient);
         for pin in lattice.pins() {
@@ -81,6 +145,7 @@ impl Lattice<'_> {
 
     /// Turns a vector over the nodes into the solution of the matrix.
     pub fn precondition(&mut self, terms: &[Term], x: &[&[DVec3]], projected: bool, vector: &mut [DVec3]) {
+        self.flow();
         if !self.system.factorised {
             self.factorise(terms, x, projected);
         }
