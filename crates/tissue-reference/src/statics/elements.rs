@@ -30,10 +30,13 @@ pub(super) struct Sample {
 pub struct Elements {
     /// Nodes at rest (m): those of the mesh, then those of the edges of quadratic elements.
     pub(super) rest: Vec<DVec3>,
-    /// The mesh.
+    /// The tetrahedra.
     mesh: TetMesh,
-    /// The node of each edge (smaller node, larger node), of quadratic elements.
+    /// The node at the middle of each edge of the body's mesh (smaller node, larger node), if the
+    /// elements have such nodes.
     middles: BTreeMap<[u32; 2], u32>,
+    /// Whether the nodes at the middles are of the tetrahedra themselves: quadratic ones.
+    quadratic: bool,
     pub(super) samples: Vec<Sample>,
     pub(super) materials: Vec<Material>,
 }
@@ -59,11 +62,34 @@ impl Elements {
         Self::of(mesh, BTreeMap::new(), samples, vec![material])
     }
 
+    /// Linear tetrahedra of half the size: each of the mesh's divided into eight.
+    pub fn divided(mesh: &TetMesh, material: Material) -> Self {
+        let middles = middles(mesh);
+        let mut fine = TetMesh { vertices: nodes_with(mesh, &middles), tets: Vec::with_capacity(8 * mesh.tets.len()) };
+        for tet in &mesh.tets {
+            let [a, b, c, d] = *tet;
+            let middle = |a: u32, b: u32| middles.get(&sorted(a, b)).copied().unwrap_or(a);
+            let [ab, ac, ad] = [middle(a, b), middle(a, c), middle(a, d)];
+            let [bc, bd, cd] = [middle(b, c), middle(b, d), middle(c, d)];
+            // Four at the corners, four around the diagonal between the middles of two edges.
+            let corners = [[a, ab, ac, ad], [ab, b, bc, bd], [ac, bc, c, cd], [ad, bd, cd, d]];
+            let inner = [[ab, cd, ac, ad], [ab, cd, ad, bd], [ab, cd, bd, bc], [ab, cd, bc, ac]];
+            for mut tet in corners.into_iter().chain(inner) {
+                let [a, b, c, d] = tet.map(|i| fine.vertices[i as usize]);
+                if (b - a).cross(c - a).dot(d - a) < 0.0 {
+                    tet.swap(2, 3);
+                }
+                fine.tets.push(tet);
+            }
+        }
+        let samples = (0..fine.tets.len()).map(|t| linear_sample(&fine, t, 0)).collect();
+        Self { middles, ..Self::of(&fine, BTreeMap::new(), samples, vec![material]) }
+    }
+
     /// Quadratic tetrahedra with straight edges: the same body, with a node at the middle of each
     /// edge, integrated at four points each.
     pub fn quadratic(mesh: &TetMesh, material: Material) -> Self {
-        let first = mesh.vertices.len() as u32;
-        let middles: BTreeMap<_, _> = mesh.edges().into_iter().zip(first..).collect();
+        let middles = middles(mesh);
         let mut samples = Vec::with_capacity(4 * mesh.tets.len());
         for (t, tet) in mesh.tets.iter().enumerate() {
             let linear = shape_gradients(mesh, t);
@@ -86,13 +112,19 @@ impl Elements {
         Self::of(mesh, middles, samples, vec![material])
     }
 
-    fn of(mesh: &TetMesh, middles: BTreeMap<[u32; 2], u32>, samples: Vec<Sample>, materials: Vec<Material>) -> Self {
-        let mut rest = mesh.vertices.clone();
-        rest.resize(mesh.vertices.len() + middles.len(), DVec3::ZERO);
-        for ([a, b], middle) in &middles {
-            rest[*middle as usize] = 0.5 * (mesh.vertices[*a as usize] + mesh.vertices[*b as usize]);
-        }
-        Self { rest, mesh: mesh.clone(), middles, samples, materials }
+    pub(super) fn of(
+        mesh: &TetMesh,
+        middles: BTreeMap<[u32; 2], u32>,
+        samples: Vec<Sample>,
+        materials: Vec<Material>,
+    ) -> Self {
+        let quadratic = !middles.is_empty();
+        Self { rest: nodes_with(mesh, &middles), mesh: mesh.clone(), middles, quadratic, samples, materials }
+    }
+
+    /// The tetrahedra; of quadratic elements, by their corners.
+    pub fn mesh(&self) -> &TetMesh {
+        &self.mesh
     }
 
     /// Nodes at rest (m).
@@ -103,7 +135,8 @@ impl Elements {
     /// Marks the nodes of everything that corners hold: those corners themselves, and the middles
     /// of edges between two of them.
     pub fn held_by(&self, corner: impl Fn(DVec3) -> bool) -> Vec<bool> {
-        let mut held: Vec<bool> = self.mesh.vertices.iter().map(|p| corner(*p)).collect();
+        let corners = self.rest.len() - self.middles.len();
+        let mut held: Vec<bool> = self.rest[..corners].iter().map(|p| corner(*p)).collect();
         held.resize(self.rest.len(), false);
         for ([a, b], middle) in &self.middles {
             held[*middle as usize] = held[*a as usize] && held[*b as usize];
@@ -130,7 +163,7 @@ impl Elements {
         }
         let (_, t, at) = best;
         let tet = self.mesh.tets[t];
-        if self.middles.is_empty() {
+        if !self.quadratic {
             return Place { nodes: tet.into_iter().zip(at).collect() };
         }
         let corners = (0..4).map(|c| (tet[c], at[c] * (2.0 * at[c] - 1.0)));
@@ -146,7 +179,7 @@ impl Elements {
         let mut shares = vec![0.0; self.rest.len()];
         for (t, tet) in self.mesh.tets.iter().enumerate() {
             let volume = self.mesh.tet_volume(t);
-            if self.middles.is_empty() {
+            if !self.quadratic {
                 tet.iter().for_each(|i| shares[*i as usize] += 0.25 * volume);
                 continue;
             }
@@ -161,9 +194,25 @@ impl Elements {
     }
 }
 
-fn linear_sample(mesh: &TetMesh, t: usize, material: usize) -> Sample {
+pub(super) fn linear_sample(mesh: &TetMesh, t: usize, material: usize) -> Sample {
     let gradients = shape_gradients(mesh, t).to_vec();
     Sample { nodes: mesh.tets[t].to_vec(), gradients, volume: mesh.tet_volume(t), material }
+}
+
+/// A node for the middle of each edge, after the mesh's own.
+fn middles(mesh: &TetMesh) -> BTreeMap<[u32; 2], u32> {
+    let first = mesh.vertices.len() as u32;
+    mesh.edges().into_iter().zip(first..).collect()
+}
+
+/// The mesh's nodes and those of the edges' middles (m).
+fn nodes_with(mesh: &TetMesh, middles: &BTreeMap<[u32; 2], u32>) -> Vec<DVec3> {
+    let mut nodes = mesh.vertices.clone();
+    nodes.resize(mesh.vertices.len() + middles.len(), DVec3::ZERO);
+    for ([a, b], middle) in middles {
+        nodes[*middle as usize] = 0.5 * (mesh.vertices[*a as usize] + mesh.vertices[*b as usize]);
+    }
+    nodes
 }
 
 fn centre(corners: &[DVec3; 4]) -> DVec3 {

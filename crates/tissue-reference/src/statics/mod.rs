@@ -8,6 +8,7 @@
 
 mod elements;
 mod newton;
+mod patches;
 
 pub use elements::{Elements, Place};
 pub use newton::{Equilibrium, Load, Loading};

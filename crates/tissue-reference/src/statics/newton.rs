@@ -21,6 +21,9 @@ const ENERGY_ROUNDING: f64 = 1e-13;
 /// Shifts of the diagonal that are tried, over its mean.
 const SHIFTS: [f64; 5] = [0.0, 1e-10, 1e-8, 1e-6, 1e-4];
 
+/// Share of the held nodes' way by which the change of the forces is found.
+const DIFFERENCE: f64 = 1e-4;
+
 /// Acceleration that makes a mass a weight on earth (m/s2).
 const EARTH: f64 = 9.81;
 
@@ -74,8 +77,8 @@ impl Elements {
             for load in &loading.loads {
                 load.place.nodes.iter().for_each(|(i, weight)| force[*i as usize] += share * *weight * load.force);
             }
-            for (i, by) in &loading.moved {
-                u[*i as usize] = share * *by;
+            if !loading.moved.is_empty() {
+                solver.move_held(&loading.moved, share, &mut u).map_err(failed)?;
             }
             iterations += solver.minimise(&force, precision, &mut u).map_err(failed)?;
         }
@@ -119,6 +122,26 @@ impl<'a> Solver<'a> {
             matrix,
             factor,
         }
+    }
+
+    /// Moves held nodes to a share of their way, and the free ones with them as the tangent says: if
+    /// they stayed, elements between them would be turned inside out.
+    fn move_held(&mut self, moved: &[(u32, DVec3)], share: f64, u: &mut [DVec3]) -> std::result::Result<(), Failure> {
+        let mut way = vec![DVec3::ZERO; u.len()];
+        for (i, by) in moved {
+            way[*i as usize] = share * *by - u[*i as usize];
+        }
+        let along = |by: f64| u.iter().zip(&way).map(|(u, way)| *u + by * *way).collect::<Vec<_>>();
+        let [before, after] = [-DIFFERENCE, DIFFERENCE].map(|by| self.gradient(&along(by)).1);
+        let change: Vec<DVec3> = before.iter().zip(&after).map(|(a, b)| (*b - *a) / (2.0 * DIFFERENCE)).collect();
+        self.factorise(u)?;
+        let mut step = vec![DVec3::ZERO; u.len()];
+        self.factor.newton_step(&self.matrix, &change, &mut step);
+        u.iter_mut().zip(&step).for_each(|(u, step)| *u += *step);
+        for (i, by) in moved {
+            u[*i as usize] = share * *by;
+        }
+        Ok(())
     }
 
     /// Moves free nodes to balance `force`; returns the number of steps.
