@@ -77,6 +77,11 @@ impl TestBody {
         Ok(body)
     }
 
+    /// Nodes and elements.
+    pub fn size(&self) -> (usize, usize) {
+        (self.mesh.vertices.len(), self.mesh.tets.len())
+    }
+
     /// Mean of the nodes about an organ coordinate.
     fn centre(&self, s: f64) -> DVec3 {
         let near = self.mesh.vertices.iter().zip(&self.axis.s).filter(|(_, own)| (**own - s).abs() < 0.04);

@@ -59,7 +59,7 @@ impl Study for MeshConvergenceExperiment {
         let settings = format!("{fingerprint:016x}");
         let Outcomes { rows, resumed } =
             job.trials("meshes", &settings, &trials, Trial::key, self.threads, |trial, _| trial.run(&body))?;
-        let result = MeshConvergenceResult::of(rows, &body, resumed)?;
+        let result = MeshConvergenceResult::from_rows(rows, body.size(), resumed)?;
         let document = page::document(&result)?;
         Ok((result, document))
     }

@@ -88,3 +88,54 @@ fn table(r: &MeshConvergenceResult) -> Table {
         ],
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::mesh_convergence::result::Cases;
+    use crate::trials::Resumed;
+
+    /// Rows whose deflections are a share below those of the reference.
+    fn made_up(default_error: f64) -> MeshConvergenceResult {
+        let row = |method: &str, edge_mm: f64, share: f64| MeshRow {
+            method: method.to_owned(),
+            edge_mm,
+            nodes: 100,
+            nu: 0.45,
+            cases: Cases {
+                sag_mm: 3.0 * share,
+                lift_mm: 10.0 * share,
+                pull_mm: vec![1.2 * share, 1.1 * share],
+                grasp_n: 0.006 / share,
+            },
+        };
+        let rows = vec![
+            row("quadratic", 2.0, 1.0),
+            row("default", 2.0, 1.0 - default_error),
+            row("linear", 2.0, 0.85),
+            row("linear", 3.0, 0.7),
+            row("lattice", 3.0, 0.8),
+        ];
+        MeshConvergenceResult::from_rows(rows, (100, 300), Resumed::default()).unwrap()
+    }
+
+    #[test]
+    fn errors_are_against_the_reference() {
+        let result = made_up(0.2);
+        for error in [result.default_sag_error, result.default_pull_error, result.default_lift_error] {
+            assert!((error - 0.2).abs() < 1e-12);
+        }
+        assert!((result.errors[2].grasp + 0.15).abs() < 1e-12, "{}", result.errors[2].grasp);
+        let html = document(&result).unwrap().page();
+        assert_eq!(html.matches("<svg").count(), CASES.len());
+        assert_eq!(html.matches("card bad").count(), 2, "sag and pull are out of bounds");
+        assert!(!document(&made_up(0.02)).unwrap().page().contains("card bad"));
+    }
+
+    #[test]
+    fn without_the_reference_there_is_no_error() {
+        let mut rows = made_up(0.1).rows;
+        rows.remove(0);
+        assert!(MeshConvergenceResult::from_rows(rows, (1, 1), Resumed::default()).is_err());
+    }
+}

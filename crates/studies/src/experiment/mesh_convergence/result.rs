@@ -1,6 +1,5 @@
 //! The figures of the study.
 
-use super::body::TestBody;
 use crate::trials::Resumed;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -73,7 +72,8 @@ pub struct MeshConvergenceResult {
 }
 
 impl MeshConvergenceResult {
-    pub(super) fn of(rows: Vec<MeshRow>, body: &TestBody, resumed: Resumed) -> Result<Self> {
+    /// From the rows, and the organ's numbers of nodes and elements.
+    pub(super) fn from_rows(rows: Vec<MeshRow>, (nodes, tets): (usize, usize), resumed: Resumed) -> Result<Self> {
         let errors = rows.iter().map(|row| errors(row, &rows)).collect::<Result<Vec<_>>>()?;
         let own = || rows.iter().zip(&errors).filter(|(row, _)| row.method == "default").map(|(_, e)| e);
         let most = |of: fn(&Errors) -> f64| own().map(|e| of(e).abs()).fold(0.0, f64::max);
@@ -82,8 +82,8 @@ impl MeshConvergenceResult {
             default_pull_error: most(|e| e.pull),
             default_lift_error: most(|e| e.lift),
             default_grasp_error: most(|e| e.grasp),
-            nodes: body.mesh.vertices.len(),
-            tets: body.mesh.tets.len(),
+            nodes,
+            tets,
             rows,
             errors,
             resumed,
