@@ -1,7 +1,7 @@
 //! The body by a lattice of hexahedra.
 
 use super::body::{Hold, Patch, TestBody};
-use super::elements::{GRASP_LIFT, GRASP_PARTS as PARTS, GRAVITY, LIFT, PULL, WEIGHT_SHARE};
+use super::elements::{GRASP_LIFT, GRASP_PARTS, GRAVITY, LIFT, PULL, WEIGHT_SHARE};
 use super::result::{Cases, MeshRow};
 use crate::{Error, Result};
 use glam::DVec3;
@@ -105,8 +105,8 @@ impl Trial<'_> {
         let body = Body::new(description).map_err(refused)?;
         let mut state = BodyState::new(&body);
         let mut newton = Newton::new(&body, Precision::default()).map_err(refused)?;
-        for part in 1..=PARTS {
-            let (gravity, springs, loads) = acting(part as f64 / PARTS as f64);
+        for part in 1..=GRASP_PARTS {
+            let (gravity, springs, loads) = acting(part as f64 / GRASP_PARTS as f64);
             newton
                 .settle(&body, &Conditions { gravity, springs: &springs, loads: &loads }, &mut state)
                 .map_err(refused)?;
