@@ -1,5 +1,6 @@
 //! The organs of a specimen as a tissue model with its state and stepper.
 
+use crate::mesh_correction::element_material;
 use crate::{Error, Result};
 use glam::DVec3;
 use trocar_geometry::{OrganAxis, TetQuality};
@@ -60,6 +61,8 @@ pub struct Surroundings {
     pub bed_friction: Option<f64>,
     /// Organs without a bed, by their indices.
     pub floating: Vec<usize>,
+    /// Whether tetrahedra are softer than their organ by what its mesh is too stiff.
+    pub mesh_correction: bool,
     /// Toughness of organs (J/m2), by their indices; [`TOUGHNESS`] of those that are left out.
     pub toughness: Vec<f64>,
 }
@@ -74,6 +77,7 @@ impl Default for Surroundings {
             filtered: Vec::new(),
             bed_friction: Some(SUPPORT_FRICTION),
             floating: Vec::new(),
+            mesh_correction: true,
             toughness: Vec::new(),
         }
     }
@@ -138,7 +142,11 @@ impl World {
             builder.body(BodyDescription {
                 name: organ.name.clone(),
                 mesh: &organ.body,
-                material: material(organ),
+                material: if surroundings.mesh_correction && surroundings.backend == Backend::Tetrahedra {
+                    element_material(tissue_of(organ), &organ.body)
+                } else {
+                    tissue_of(organ)
+                },
                 pinned: pinned_nodes(organ, &axis, up),
                 supports: bed.map(|friction| support_under(organ, up, friction)).transpose()?.into_iter().collect(),
             })?;
@@ -240,7 +248,8 @@ fn support_under(organ: &Organ, up: DVec3, friction: f64) -> Result<Support> {
     Ok(SupportField::under(&organ.body, up, cell, friction)?.into())
 }
 
-fn material(organ: &Organ) -> Material {
+/// The tissue of an organ.
+pub fn tissue_of(organ: &Organ) -> Material {
     let m = organ.material;
     Material {
         model: match m.model {

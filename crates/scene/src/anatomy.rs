@@ -283,6 +283,9 @@ pub struct Tissue {
     pub law: Option<LatticeLaw>,
     /// Schedule: fast (the default solver), paper or adaptive (Vertex Block Descent).
     pub schedule: ScheduleName,
+    /// Whether elements are softer than their organ by what its mesh is too stiff, so that the organ
+    /// deflects as its material says.
+    pub mesh_correction: bool,
     /// Distance at which contact between organs is looked for (mm).
     pub contact_offset_mm: f64,
     /// What of tissue touches instruments: vertices or surface.
@@ -307,6 +310,7 @@ impl Default for Tissue {
             cell_mm: None,
             law: None,
             schedule: ScheduleName::Fast,
+            mesh_correction: true,
             contact_offset_mm: 1.5,
             tool_contact: ToolContactKind::Surface,
             tip_rest_offset_mm: 1.5,

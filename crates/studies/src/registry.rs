@@ -5,9 +5,9 @@ use crate::bench::{
 };
 use crate::experiment::{
     ContactExperiment, ControllerGridExperiment, ConvergenceExperiment, CutForceExperiment, ElementQualityExperiment,
-    GraspDesignsExperiment, IntegratorsExperiment, PortBudgetExperiment, PortRegraspExperiment,
-    RandomActionsExperiment, ReconstructionExperiment, RobustnessExperiment, RolloutsExperiment, SettlingExperiment,
-    SimilarityExperiment, WrenchExperiment,
+    GraspDesignsExperiment, IntegratorsExperiment, MeshConvergenceExperiment, PortBudgetExperiment,
+    PortRegraspExperiment, RandomActionsExperiment, ReconstructionExperiment, RobustnessExperiment, RolloutsExperiment,
+    SettlingExperiment, SimilarityExperiment, WrenchExperiment,
 };
 use crate::study::{Entry, Of};
 
@@ -15,6 +15,7 @@ use crate::study::{Entry, Of};
 pub static STUDIES: &[&dyn Entry] = &[
     &Of::<ReconstructionExperiment>::NEW,
     &Of::<ConvergenceExperiment>::NEW,
+    &Of::<MeshConvergenceExperiment>::NEW,
     &Of::<IntegratorsExperiment>::NEW,
     &Of::<ContactExperiment>::NEW,
     &Of::<SettlingExperiment>::NEW,

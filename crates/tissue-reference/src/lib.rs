@@ -4,7 +4,7 @@
 //! [`Oracle`] finds the step of implicit Euler and the static equilibrium to double precision,
 //! slowly, also in contact with tools and between bodies. [`SemiImplicit`] and [`Xpbd`] are the
 //! methods that the paper compares with, each in its best known form. [`Scheme`] puts all of them
-//! behind a [`trocar_tissue::Stepper`]. Only studies, tests and recorded phantom lifts link this
+//! behind a [`trocar_tissue::Stepper`]. [`statics`] finds equilibria by other elements. Only studies, tests and recorded phantom lifts link this
 //! crate.
 //!
 //! The comparators advance the same body as the implicit solvers do (masses, energies, dashpots and
@@ -22,6 +22,7 @@ pub mod oracle;
 mod scheme;
 mod semi_implicit;
 mod stable_step;
+pub mod statics;
 mod xpbd;
 mod xpbd_constraints;
 mod xpbd_settings;

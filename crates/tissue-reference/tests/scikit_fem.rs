@@ -9,6 +9,7 @@ use trocar_tissue::{
     BodyDescription, ConstitutiveModel, MassFloor, Material, Model, ModelBuilder, SolverSettings, State, Stepper,
 };
 use trocar_tissue_reference::oracle::Precision;
+use trocar_tissue_reference::statics::{Elements, Loading};
 use trocar_tissue_reference::{Oracle, OracleState};
 
 /// The fixture's displacements (m) of one solution.
@@ -74,4 +75,31 @@ fn the_default_schedule_sags_as_scikit_fem() {
     let off = off(&model, &state.positions(&model, 0), &solution("stable-neo-hookean"));
     println!("the default schedule: {off:.1e} from scikit-fem's");
     assert!(off < 1e-3, "{off:.1e}");
+}
+
+/// Quadratic tetrahedra, and linear ones by the same Newton's method, are scikit-fem's.
+#[test]
+fn elements_of_either_order_sag_as_scikit_fem() {
+    let mesh = block([5, 4, 4], 3e-3);
+    let material = tissue(12e3);
+    for (name, quadratic, share, most) in [
+        ("stable-neo-hookean", false, 1.0, 1e-6),
+        ("quadratic-linear", true, 1e-4, 1e-4),
+        ("quadratic-stable-neo-hookean", true, 1.0, 1e-6),
+    ] {
+        let elements = if quadratic { Elements::quadratic(&mesh, material) } else { Elements::linear(&mesh, material) };
+        let held = elements.held_by(|p| p.x == 0.0);
+        let loading = Loading { body_force: share * material.density * GRAVITY, ..Loading::default() };
+        let precision = Precision { gradient: 1e-9 * share, ..Precision::default() };
+        let found = elements.settle(&held, &loading, 4, precision).unwrap();
+        let reference = solution(name);
+        let largest = |of: &dyn Fn(usize) -> f64| (0..reference.len()).map(of).fold(0.0, f64::max);
+        let off = largest(&|i| (found.displacements[i] - reference[i]).length()) / largest(&|i| reference[i].length());
+        println!("{name}: {off:.1e} from scikit-fem's after {} steps", found.iterations);
+        assert_eq!(reference.len(), mesh.vertices.len());
+        assert!(off < most, "{name}: {off:.1e}");
+        let weight = share * material.density * mesh.volume() * GRAVITY;
+        let carried = found.reactions.iter().sum::<DVec3>();
+        assert!((carried + weight).length() < 1e-6 * weight.length(), "the pins carry {carried}, not {weight}");
+    }
 }

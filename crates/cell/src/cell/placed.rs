@@ -80,6 +80,7 @@ impl Placed {
             filtered,
             bed_friction: (support.kind == SupportKind::Imprint).then_some(support.friction),
             floating,
+            mesh_correction: scene.tissue.mesh_correction,
             toughness,
         };
         let heights = placed.organs.iter().flat_map(|o| &o.body.vertices).map(|p| p.z);

@@ -6,7 +6,7 @@ use trocar_sparse::{Cholesky, Level};
 use trocar_tissue::assembly::Stiffness;
 
 /// A Cholesky factor and its memory.
-pub(super) struct Factor {
+pub(crate) struct Factor {
     cholesky: Cholesky<f64>,
     right: Vec<f64>,
 }

@@ -27,8 +27,8 @@
 //! All work is done on the calling thread in a fixed order: the same machine gives the same bits.
 
 mod contact;
-mod element;
-mod factor;
+pub(crate) mod element;
+pub(crate) mod factor;
 mod guard;
 mod integrator;
 mod newton;
