@@ -6,7 +6,7 @@ use trocar_geometry::{OrganAxis, TetQuality};
 use trocar_scene::TOUGHNESS;
 use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen};
 use trocar_tissue::{
-    BodyContact, BodyDescription, Collider, ConstitutiveModel, Event, Load, Material, Model, ModelBuilder,
+    Backend, BodyContact, BodyDescription, Collider, ConstitutiveModel, Event, Load, Material, Model, ModelBuilder,
     SolverSettings, State, Stepper, Support, SupportField, ToolContact, ToolForce, ToolMotion, pins,
 };
 
@@ -48,6 +48,8 @@ pub struct World {
 /// What organs lie on and how they touch each other.
 #[derive(Clone, Debug)]
 pub struct Surroundings {
+    /// What bears the tissue.
+    pub backend: Backend,
     /// How organs touch each other; None if they pass through each other.
     pub body_contact: Option<BodyContact>,
     /// What of organs touches instruments.
@@ -66,6 +68,7 @@ impl Default for Surroundings {
     /// Organs that touch each other, on a bed with their imprints.
     fn default() -> Self {
         Self {
+            backend: Backend::default(),
             body_contact: Some(BodyContact::default()),
             tool_contact: ToolContact::default(),
             filtered: Vec::new(),
@@ -121,7 +124,10 @@ impl World {
         threads: usize,
     ) -> Result<Self> {
         let up = specimen.up.normalize();
-        let mut builder = ModelBuilder::new().gravity(-GRAVITY * up).tool_contact(surroundings.tool_contact);
+        let mut builder = ModelBuilder::new()
+            .gravity(-GRAVITY * up)
+            .tool_contact(surroundings.tool_contact)
+            .backend(surroundings.backend);
         if let Some(contact) = surroundings.body_contact {
             builder = builder.body_contact(contact);
         }

@@ -46,9 +46,11 @@
 
 mod body;
 mod clip;
+mod elastic;
 mod element;
 mod embedding;
 mod error;
+mod flow;
 mod grid;
 mod held;
 mod lattice;
@@ -62,8 +64,10 @@ mod ramify;
 mod symmetric;
 
 pub use body::{Body, BodyDescription, BodyState, Conditions, PointLoad, Spring};
+pub use elastic::RestStiffness;
 pub use embedding::EmbeddedPoint;
 pub use error::{Error, Failure, Result};
+pub use flow::Flow;
 pub use grid::{BoundaryRule, LatticeOptions, MAX_CELLS};
 pub use lattice::{Hexahedron, Lattice};
 pub use material::{Law, Material};

@@ -272,6 +272,15 @@ pub enum ToolContactKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Tissue {
+    /// What bears the tissue: tetrahedra, or a lattice of hexahedra around each organ.
+    #[serde(skip_serializing_if = "is_tetrahedra")]
+    pub backend: BackendName,
+    /// Edge of the lattice's cells (mm); 4 mm if left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cell_mm: Option<f64>,
+    /// Law of a lattice's tissue: corotated (if left out) or stable-neo-hookean.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub law: Option<LatticeLaw>,
     /// Schedule: fast (the default solver), paper or adaptive (Vertex Block Descent).
     pub schedule: ScheduleName,
     /// Distance at which contact between organs is looked for (mm).
@@ -294,6 +303,9 @@ impl Default for Tissue {
     /// The paper's figures (section IV-C).
     fn default() -> Self {
         Self {
+            backend: BackendName::Tetrahedra,
+            cell_mm: None,
+            law: None,
             schedule: ScheduleName::Fast,
             contact_offset_mm: 1.5,
             tool_contact: ToolContactKind::Surface,
@@ -306,6 +318,34 @@ impl Default for Tissue {
             support: Support::default(),
         }
     }
+}
+
+/// What bears the tissue of a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum BackendName {
+    /// The tetrahedra of the organs.
+    #[default]
+    Tetrahedra,
+    /// A regular lattice of hexahedra around each organ, in which its nodes are embedded.
+    Lattice,
+}
+
+/// A scene on tetrahedra is written as before there were others.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_tetrahedra(backend: &BackendName) -> bool {
+    *backend == BackendName::Tetrahedra
+}
+
+/// Laws of tissue on a lattice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum LatticeLaw {
+    /// Rotated linear elasticity.
+    #[default]
+    Corotated,
+    /// Stable neo-Hookean.
+    StableNeoHookean,
 }
 
 /// The ground under the organs.

@@ -4,10 +4,13 @@ use crate::contact::ToolGroup;
 use crate::descent::TouchingDescent;
 use crate::external::{ExternalSolver, Integrator};
 use crate::frame::Frame;
+use crate::lattice::LatticeSolver;
 use crate::quasi_newton::QuasiNewtonSolver;
 use crate::report::Divergence;
 use crate::solver_set::{BodySolvers, SolverSet};
-use crate::{Body, Error, Event, Load, Model, Result, SolverSettings, State, StepReport, ToolForce, ToolMotion};
+use crate::{
+    Backend, Body, Error, Event, Load, Model, Result, SolverSettings, State, StepReport, ToolForce, ToolMotion,
+};
 use glam::DVec3;
 
 /// Advances states of one model.
@@ -22,6 +25,7 @@ pub struct Stepper {
     /// None: the calling thread does the work.
     pool: Option<rayon::ThreadPool>,
     solvers: Box<dyn SolverSet>,
+    backend: Backend,
     forces: Vec<ToolForce>,
     events: Vec<Event>,
 }
@@ -35,7 +39,7 @@ impl Stepper {
     pub fn new(model: &Model, settings: SolverSettings, dt: f64, threads: usize) -> Result<Self> {
         settings.check()?;
         let threaded_bodies = matches!(settings, SolverSettings::Descent(_));
-        Self::with_solvers(model, solvers(settings, dt), threaded_bodies, dt, threads)
+        Self::with_solvers(model, solvers(model.backend, settings, dt), threaded_bodies, dt, threads)
     }
 
     /// Prepares to step with an integrator from outside this crate: `make` makes the one of each
@@ -64,7 +68,8 @@ impl Stepper {
             return Err(Error::Model(format!("a frame of {dt} s; must be in (0, 10]")));
         }
         let (forces, events) = (Vec::new(), Vec::new());
-        let mut stepper = Self { dt, threaded_bodies, threads, pool: None, solvers, forces, events };
+        let backend = model.backend;
+        let mut stepper = Self { dt, threaded_bodies, threads, pool: None, solvers, backend, forces, events };
         stepper.set_model(model)?;
         Ok(stepper)
     }
@@ -76,8 +81,14 @@ impl Stepper {
     /// with the same bits as in a new stepper.
     ///
     /// # Errors
-    /// Threads that the system refuses; the stepper then still steps the old model.
+    /// A model of another backend, and threads that the system refuses; the stepper then still steps
+    /// the old model.
     pub fn set_model(&mut self, model: &Model) -> Result<()> {
+        if self.backend != model.backend {
+            return Err(Error::Model(
+                "the model has another backend than the stepper's; make another stepper".to_owned(),
+            ));
+        }
         // Handing a small model to a pool costs more than a frame.
         let single_body = !self.threaded_bodies && model.bodies.len() == 1;
         let single_thread = self.threads == 1 || single_body;
@@ -242,8 +253,12 @@ impl Stepper {
     }
 }
 
-/// The solvers of these settings.
-fn solvers(settings: SolverSettings, dt: f64) -> Box<dyn SolverSet> {
+/// The solvers of these settings. Those of lattices are one method, which takes substeps and tolerances
+/// from them.
+fn solvers(backend: Backend, settings: SolverSettings, dt: f64) -> Box<dyn SolverSet> {
+    if let Backend::Lattice(_) = backend {
+        return Box::new(BodySolvers::new(move |body, _| LatticeSolver::new(settings, body)));
+    }
     match settings {
         SolverSettings::QuasiNewton(method) => Box::new(BodySolvers::new(move |body, single_thread| {
             QuasiNewtonSolver::new(method, body, dt, single_thread)

@@ -32,7 +32,7 @@ mod tool_placement;
 pub use body_contact::BodyContact;
 pub use collider::Collider;
 pub(crate) use compliant_grasp::CompliantNode;
-pub(crate) use contact::{Contact, Push};
+pub(crate) use contact::{Contact, Friction, Push};
 pub(crate) use contact_set::ContactSet;
 pub(crate) use coupling::Coupling;
 pub use force::{Event, ToolForce};

@@ -4,8 +4,9 @@ use super::split::{Split, parts};
 use super::{Piece, Severed};
 use crate::builder::{Inherited, lay_out};
 use crate::contact::Anchor;
+use crate::lattice::Embedding;
 use crate::state::{BodyState, WarmStart};
-use crate::{Body, BodyDescription, Compliance, Grasp, Hole, MassFloor, Model, State};
+use crate::{Backend, Body, BodyDescription, Compliance, Grasp, Hole, MassFloor, Model, Result, State};
 use trocar_geometry::TetMesh;
 
 /// A mass this many times the weight of the volume around a node was raised to the floor; less is
@@ -13,7 +14,10 @@ use trocar_geometry::TetMesh;
 const RAISED_MASS_RATIO: f64 = 1.0 + 1e-5;
 
 /// The model and state with the body at `index` as it was `split`.
-pub(super) fn carry(model: &Model, state: &State, index: usize, split: &Split) -> Severed {
+///
+/// # Errors
+/// A piece without a lattice, if the whole has one.
+pub(super) fn carry(model: &Model, state: &State, index: usize, split: &Split) -> Result<Severed> {
     let whole = &model.bodies[index];
     let (group, groups) = bodies(whole, split);
     // Place of each new node in its body.
@@ -45,8 +49,16 @@ pub(super) fn carry(model: &Model, state: &State, index: usize, split: &Split) -
         let pinned = (0..nodes.len() as u32).filter(|k| whole.pinned[nodes[*k as usize] as usize]).collect();
         let (material, supports) = (whole.material, whole.supports.clone());
         let description = BodyDescription { name, mesh: &mesh, material, pinned, supports };
-        let body = lay_out(description, MassFloor::None, whole.contact_stiffness, Some(inherited));
-        let motion = motion(whole, &state.bodies[index], &body, &nodes);
+        let mut body = lay_out(description, MassFloor::None, whole.contact_stiffness, Some(inherited));
+        if let Backend::Lattice(settings) = model.backend {
+            body.lattice = Embedding::of(&body, settings)?;
+        }
+        let mut motion = motion(whole, &state.bodies[index], &body, &nodes);
+        if let (Some(lattice), Some(before), Some(state)) =
+            (&body.lattice, &whole.lattice, &state.bodies[index].lattice)
+        {
+            motion.lattice = Some(lattice.of_piece(before, state, &elements));
+        }
         let at = if g == 0 { index } else { after.bodies.len() };
         if g == 0 {
             after.bodies[at] = body;
@@ -75,7 +87,7 @@ pub(super) fn carry(model: &Model, state: &State, index: usize, split: &Split) -
             moved.holes.push(hole.clone());
         }
     }
-    Severed { model: after, state: moved, faces: split.faces, pieces }
+    Ok(Severed { model: after, state: moved, faces: split.faces, pieces })
 }
 
 /// The body of each new node, 0 being the one that stays, and the number of bodies. Of each
@@ -157,6 +169,7 @@ fn motion(whole: &Body, state: &BodyState, piece: &Body, nodes: &[u32]) -> BodyS
             falling: from.iter().map(|i| state.warm.falling[*i]).collect(),
             supported: from.iter().map(|i| state.warm.supported[*i]).collect(),
         },
+        lattice: piece.lattice.as_ref().map(|lattice| lattice.at_rest()),
     }
 }
 

@@ -171,7 +171,7 @@ pub fn sever_part(model: &Model, state: &State, cut: &Cut, part: [f64; 2], sides
         };
         return Ok(Severed { model: model.clone(), state: state.clone(), faces: 0, pieces: vec![whole] });
     }
-    Ok(carry::carry(model, state, cut.body, &split))
+    carry::carry(model, state, cut.body, &split)
 }
 
 /// The body that `cut` is to sever.

@@ -5,7 +5,7 @@ mod motion;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use body_state::{BodyState, WarmStart};
+pub(crate) use body_state::{BodyState, Repair, WarmStart};
 pub use motion::BodyMotion;
 
 use crate::contact::Source;
@@ -91,6 +91,7 @@ impl State {
         for (to, from) in self.bodies.iter_mut().zip(&other.bodies) {
             to.x.copy_from_slice(&from.x);
             to.v.copy_from_slice(&from.v);
+            to.lattice.clone_from(&from.lattice);
             to.anchors.clear();
             to.feature_anchors.clear();
             to.anchors.extend(from.anchors.iter().filter(|anchor| matches!(anchor.source, Source::Support(_))));
@@ -139,6 +140,9 @@ impl State {
     pub fn stop(&mut self) {
         for body in &mut self.bodies {
             body.v.fill(Vec3A::ZERO);
+            if let Some(lattice) = &mut body.lattice {
+                lattice.velocities.fill(DVec3::ZERO);
+            }
         }
     }
 
