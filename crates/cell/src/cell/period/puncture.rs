@@ -1,10 +1,9 @@
 //! Stage 5: tissue on which an instrument presses hard enough is punctured.
 //!
 //! An instrument whose axis comes inside an organ has punctured it if it pressed on it with at least
-//! the scene's `safety.puncture_force_n`. That is what tissue does, not a suspension of physics. The
-//! organ then has a hole around the part of the axis inside it, which becomes larger as the
-//! instrument goes on, and which lets this instrument through. Everywhere else they touch as before.
-//! When the instrument is out, the hole is gone.
+//! the scene's `safety.puncture_force_n`. The organ then has a hole around the part of
+//! the axis inside it, which becomes larger as the instrument goes on, and which lets this instrument
+//! through. Everywhere else they touch as before. When the instrument is out, the hole is gone.
 
 use crate::World;
 use crate::cell::Cell;

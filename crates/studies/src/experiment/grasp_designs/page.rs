@@ -11,6 +11,7 @@ use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, or_dash, yes_or_no};
+use trocar_task::Warnings;
 
 pub(super) fn document(r: &GraspDesignsResult) -> Result<Document> {
     let mut document = Document::new("Grasp designs", "Four ways to hold the appendix");
@@ -30,8 +31,8 @@ pub(super) fn document(r: &GraspDesignsResult) -> Result<Document> {
                    and activation step: medians over the trials that did not diverge, as in the paper. Snap: \
                    displacement that the grasp prescribes, least and greatest trial, each the greatest of its nodes; \
                    zero by construction for live-pose and compliant, which capture nodes where they are. Activation \
-                   step: largest motion of a node in the first frame of the grasp. Suspensions: contacts disabled / \
-                   contacts of blades disabled / organs relaxed.";
+                   step: largest motion of a node in the first frame of the grasp. Warnings: ";
+    let columns = format!("{columns}{}.", Warnings::LEGEND);
     let appendix = format!(
         "Appendix: {} nodes, {} elements, {} kPa, {} kg/m3; {} mm lift, jaw force {} N.",
         count(r.nodes),
@@ -41,7 +42,7 @@ pub(super) fn document(r: &GraspDesignsResult) -> Result<Document> {
         r.lift_mm,
         r.jaw_force_n
     );
-    let lines = [columns.to_owned(), appendix].into_iter().chain(resumed(&r.resumed, "trials"));
+    let lines = [columns, appendix].into_iter().chain(resumed(&r.resumed, "trials"));
     Ok(document.with(Section::new("Settings", "").lines(lines)).with(trials(r)))
 }
 
@@ -88,7 +89,7 @@ fn table_ii(r: &GraspDesignsResult, condition: Condition) -> Table {
         "Activation step (mm)",
         "Inverted",
         "Smallest volume",
-        "Suspensions",
+        "Warnings",
     ];
     let range = |ends: Option<(f64, f64)>| match ends {
         None => "\u{2013}".to_owned(),
