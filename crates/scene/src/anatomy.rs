@@ -278,7 +278,7 @@ pub struct Tissue {
     /// Edge of the lattice's cells (mm); 4 mm if left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cell_mm: Option<f64>,
-    /// Law of a lattice's tissue: corotated (if left out) or stable-neo-hookean.
+    /// Law of a lattice's tissue: stable-neo-hookean (if left out) or corotated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub law: Option<LatticeLaw>,
     /// Schedule: fast (the default solver), paper or adaptive (Vertex Block Descent).
@@ -345,10 +345,10 @@ fn is_tetrahedra(backend: &BackendName) -> bool {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LatticeLaw {
-    /// Rotated linear elasticity.
-    #[default]
+    /// Rotated linear elasticity. It turns inside out where jaws squeeze it.
     Corotated,
     /// Stable neo-Hookean.
+    #[default]
     StableNeoHookean,
 }
 
