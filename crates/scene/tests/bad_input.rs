@@ -236,7 +236,7 @@ fn numbers() {
         Case(
             "schedule = \"fast\" ",
             "backend = \"lattice\"\ncell_mm = 0.2§ ",
-            "tissue.cell_mm is 0.2; it must be in [1, 20]",
+            "tissue.cell_mm is 0.2; it must be in [1, 20] mm",
         ),
         Case(
             "schedule = \"fast\" ",
