@@ -25,11 +25,12 @@ const SPECIMEN_SOURCES: [&str; 9] = [
 
 /// What an episode depends on: crates, the observations of remote policies, and the versions of all
 /// dependencies.
-const EPISODE_SOURCES: [&str; 15] = [
+const EPISODE_SOURCES: [&str; 16] = [
     "camera/src",
     "cell/src",
     "core/src",
     "geometry/src",
+    "lattice/src",
     "remote/src",
     "render/src",
     "robot/src",

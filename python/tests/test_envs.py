@@ -59,6 +59,7 @@ def test_the_last_step_says_why_it_ended(one):
     assert late and not ended
     assert info["end"] == "time-out" and not info["is_success"] and "time was up" in info["why"]
     assert info["summary"]["simulated_s" if "simulated_s" in info["summary"] else "end"] is not None
+    assert info["summary"]["punctures"] == info["summary"]["pierced"] == 0
     with pytest.raises(RuntimeError, match="ended"):
         one.step(actions[0])
     one.reset(seed=1)

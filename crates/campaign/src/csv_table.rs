@@ -7,7 +7,7 @@ use trocar_workflow::{Error, Result};
 type Column = (&'static str, fn(&EpisodeRecord) -> String);
 
 /// The columns that all tasks have. The times of the stages follow.
-const COLUMNS: [Column; 25] = [
+const COLUMNS: [Column; 26] = [
     ("policy", |k| k.name.clone()),
     ("episode", |k| k.index.to_string()),
     ("seed", |k| k.seed.to_string()),
@@ -29,9 +29,10 @@ const COLUMNS: [Column; 25] = [
     ("peak_constraint_n", |k| k.peak(|a| a.peak_constraint_n).to_string()),
     ("peak_jaw_n", |k| k.peak(|a| a.peak_jaw_n).to_string()),
     ("inverted_peak", |k| k.summary.inverted_peak.to_string()),
-    ("disabled_contacts", |k| k.summary.disabled_contacts.to_string()),
-    ("disabled_blades", |k| k.summary.disabled_blades.to_string()),
-    ("relaxed", |k| k.summary.relaxed.to_string()),
+    ("punctures", |k| k.summary.warnings.punctures.to_string()),
+    ("pierced", |k| k.summary.warnings.pierced.to_string()),
+    ("overstretched", |k| k.summary.warnings.overstretched.to_string()),
+    ("folded", |k| k.summary.warnings.folded.to_string()),
     ("state_hash", |k| k.state_hash.clone()),
 ];
 

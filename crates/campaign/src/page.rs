@@ -13,6 +13,7 @@ use trocar_report::document::Table;
 use trocar_report::figures;
 use trocar_report::page::{self, Card, Columns};
 use trocar_report::table::{fixed, or_dash};
+use trocar_task::Warnings;
 use trocar_workflow::{Result, counted};
 
 /// Maximum number of failures in the list.
@@ -129,11 +130,7 @@ fn cards(manifest: &Manifest, r: &CampaignResult) -> String {
     let diverged: usize = r.policies.iter().map(|p| p.ends.diverged).sum();
     all.push(Card::new("Inverted elements", inverted.to_string(), "maximum of any frame").met(inverted == 0));
     all.push(Card::new("Diverged", diverged.to_string(), "episodes").met(diverged == 0));
-    let s = &r.suspensions;
-    let counts = [s.disabled_contacts, s.disabled_blades, s.relaxed];
-    let note = "of physics by safety rules: contacts disabled / contacts of blades disabled / organs relaxed";
-    let said = counts.map(|n| n.to_string()).join("/");
-    all.push(Card::new("Suspensions", said, note).met(counts == [0; 3]));
+    all.push(Card::new("Warnings", r.warnings.to_string(), Warnings::LEGEND).met(r.warnings.is_empty()));
     page::cards(&all)
 }
 
@@ -160,7 +157,7 @@ fn outcome(r: &CampaignResult) -> String {
             ("lag (ms)", &|p| or_dash(p.lag_ms, 0)),
             ("jaw force (N)", &|p| or_dash(p.peak_jaw_n, 2)),
             ("grasp at s", &|p| p.grasp_at.map_or_else(dash, at)),
-            ("suspensions", &|p| p.suspensions()),
+            ("warnings", &|p| p.warnings.to_string()),
         ],
     );
     table.html()

@@ -10,7 +10,7 @@ use crate::outcomes::distinct_outcomes;
 use crate::store::EpisodeRecord;
 use serde::Serialize;
 use std::path::Path;
-use trocar_task::End;
+use trocar_task::{End, Warnings};
 
 /// Number of episodes that passed a stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -115,12 +115,8 @@ pub struct PolicyRow {
     pub lag_ms: Option<f64>,
     /// Maximum number of inverted elements in any frame.
     pub inverted_peak: usize,
-    /// Number of times that contact of an instrument was disabled: a suspension of physics.
-    pub disabled_contacts: usize,
-    /// Number of times that contact of blades that hold tissue was disabled.
-    pub disabled_blades: usize,
-    /// Number of times that an organ was relaxed outside of time.
-    pub relaxed: usize,
+    /// What was beyond what tissue bears.
+    pub warnings: Warnings,
     /// Reason of the policy's first failure.
     pub policy_error: Option<String>,
 }
@@ -144,17 +140,6 @@ pub struct Comparison {
     pub score_difference: f64,
 }
 
-/// Suspensions of physics in all episodes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Suspensions {
-    /// Number of times that contact of an instrument was disabled.
-    pub disabled_contacts: usize,
-    /// Number of times that contact of blades that hold tissue was disabled.
-    pub disabled_blades: usize,
-    /// Number of times that an organ was relaxed outside of time.
-    pub relaxed: usize,
-}
-
 /// The figures of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CampaignResult {
@@ -173,8 +158,11 @@ pub struct CampaignResult {
     /// Sum over the policies of the episodes that differ from each other in any figure by more than
     /// can be measured: 0.01 mm, 0.001 N or one control period.
     pub distinct_outcomes: usize,
-    /// Suspensions of physics.
-    pub suspensions: Suspensions,
+    /// What was beyond what tissue bears.
+    pub warnings: Warnings,
+    /// How often a rule switched physics off: never, since none does. Results of earlier programs
+    /// have other numbers here.
+    pub suspensions: usize,
     /// What varied, and what was drawn.
     pub variation: VariationResult,
     /// Success over what varied.
@@ -187,13 +175,6 @@ pub struct CampaignResult {
     pub hash: String,
     /// Path of the report.
     pub report: String,
-}
-
-impl PolicyRow {
-    /// Suspensions of physics as `contacts/blades/relaxed`.
-    pub fn suspensions(&self) -> String {
-        format!("{}/{}/{}", self.disabled_contacts, self.disabled_blades, self.relaxed)
-    }
 }
 
 impl CampaignResult {
@@ -226,11 +207,8 @@ impl CampaignResult {
             planned: manifest.count(),
             passed: records.iter().filter(|k| k.summary.passed).count(),
             distinct_outcomes: policies.iter().map(|p| p.distinct_outcomes).sum(),
-            suspensions: Suspensions {
-                disabled_contacts: policies.iter().map(|p| p.disabled_contacts).sum(),
-                disabled_blades: policies.iter().map(|p| p.disabled_blades).sum(),
-                relaxed: policies.iter().map(|p| p.relaxed).sum(),
-            },
+            warnings: policies.iter().map(|p| p.warnings).sum(),
+            suspensions: 0,
             variation: VariationResult::of(manifest, records),
             by: by.iter().map(|by| Curve::of(by, &names, records)).collect(),
             policies,
@@ -287,9 +265,7 @@ fn row(name: &str, records: &[&EpisodeRecord], names: &[&str], manifest: &Manife
         peak_jaw_n: peak(|a| a.peak_jaw_n),
         lag_ms: median(records.iter().filter_map(|k| k.lag_ms()).collect()),
         inverted_peak: records.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),
-        disabled_contacts: records.iter().map(|k| k.summary.disabled_contacts).sum(),
-        disabled_blades: records.iter().map(|k| k.summary.disabled_blades).sum(),
-        relaxed: records.iter().map(|k| k.summary.relaxed).sum(),
+        warnings: records.iter().map(|k| k.summary.warnings).sum(),
         policy_error,
     }
 }

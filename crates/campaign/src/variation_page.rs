@@ -124,7 +124,7 @@ pub(super) fn episodes(records: &[EpisodeRecord]) -> String {
         .iter()
         .find_map(|k| k.summary.drawn.as_ref())
         .map_or_else(Vec::new, |drawn| drawn.values.iter().map(|v| v.name()).collect());
-    let fixed = ["policy", "seed", "split", "passed", "stages", "end", "suspensions", "specimen"];
+    let fixed = ["policy", "seed", "split", "passed", "stages", "end", "warnings", "specimen"];
     let head = fixed.into_iter().chain(names.iter().map(String::as_str));
     let row = |k: &EpisodeRecord| {
         let s = &k.summary;
@@ -140,7 +140,7 @@ pub(super) fn episodes(records: &[EpisodeRecord]) -> String {
             yes_or_no(s.passed),
             format!("{} of {}", s.stage, s.progress.stages.len()),
             if s.passed { "passed".to_owned() } else { k.why() },
-            format!("{}/{}/{}", s.disabled_contacts, s.disabled_blades, s.relaxed),
+            s.warnings.to_string(),
             drawn.map_or("\u{2013}".to_owned(), |d| d.specimen.label()),
         ];
         first.into_iter().chain(names.iter().map(number)).collect::<Vec<_>>()
@@ -148,7 +148,7 @@ pub(super) fn episodes(records: &[EpisodeRecord]) -> String {
     let rows: Vec<Vec<String>> = records.iter().take(MAX_LISTED).map(row).collect();
     let note = if records.len() > MAX_LISTED { format!("the first {MAX_LISTED} of ") } else { String::new() };
     let title = format!("{note}{}", counted(records.len(), "episode"));
-    let lead = "What was drawn for each episode, and how it ended. Suspensions: contacts disabled, contacts of blades \
-                disabled, organs relaxed. <code>table.csv</code> has all figures.";
+    let lead = "What was drawn for each episode, and how it ended. Warnings: punctures, instruments that pierced an organ, \
+                organs overstretched, organs that stayed folded. <code>table.csv</code> has all figures.";
     page::section("Episodes", lead, &page::fold(&title, &Table::new(head, rows).html()))
 }

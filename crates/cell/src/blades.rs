@@ -33,7 +33,12 @@ impl Tools {
 
     /// The forces on the three tools; zero where `forces` has none.
     pub fn forces(self, forces: &[ToolForce]) -> [ToolForce; 3] {
-        [self.gripper, self.blades[0], self.blades[1]].map(|t| forces.get(t).copied().unwrap_or_default())
+        self.all().map(|t| forces.get(t).copied().unwrap_or_default())
+    }
+
+    /// The three tools.
+    pub(crate) fn all(self) -> [usize; 3] {
+        [self.gripper, self.blades[0], self.blades[1]]
     }
 }
 

@@ -7,7 +7,7 @@ use trocar_geometry::{OrganAxis, TetQuality};
 use trocar_scene::TOUGHNESS;
 use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen};
 use trocar_tissue::{
-    BodyContact, BodyDescription, Collider, ConstitutiveModel, Event, Load, Material, Model, ModelBuilder,
+    Backend, BodyContact, BodyDescription, Collider, ConstitutiveModel, Event, Load, Material, Model, ModelBuilder,
     SolverSettings, State, Stepper, Support, SupportField, ToolContact, ToolForce, ToolMotion, pins,
 };
 
@@ -49,6 +49,8 @@ pub struct World {
 /// What organs lie on and how they touch each other.
 #[derive(Clone, Debug)]
 pub struct Surroundings {
+    /// What bears the tissue.
+    pub backend: Backend,
     /// How organs touch each other; None if they pass through each other.
     pub body_contact: Option<BodyContact>,
     /// What of organs touches instruments.
@@ -59,7 +61,7 @@ pub struct Surroundings {
     pub bed_friction: Option<f64>,
     /// Organs without a bed, by their indices.
     pub floating: Vec<usize>,
-    /// Whether elements are softer than their organ by what its mesh is too stiff.
+    /// Whether tetrahedra are softer than their organ by what its mesh is too stiff.
     pub mesh_correction: bool,
     /// Toughness of organs (J/m2), by their indices; [`TOUGHNESS`] of those that are left out.
     pub toughness: Vec<f64>,
@@ -69,6 +71,7 @@ impl Default for Surroundings {
     /// Organs that touch each other, on a bed with their imprints.
     fn default() -> Self {
         Self {
+            backend: Backend::default(),
             body_contact: Some(BodyContact::default()),
             tool_contact: ToolContact::default(),
             filtered: Vec::new(),
@@ -125,7 +128,10 @@ impl World {
         threads: usize,
     ) -> Result<Self> {
         let up = specimen.up.normalize();
-        let mut builder = ModelBuilder::new().gravity(-GRAVITY * up).tool_contact(surroundings.tool_contact);
+        let mut builder = ModelBuilder::new()
+            .gravity(-GRAVITY * up)
+            .tool_contact(surroundings.tool_contact)
+            .backend(surroundings.backend);
         if let Some(contact) = surroundings.body_contact {
             builder = builder.body_contact(contact);
         }
@@ -136,7 +142,7 @@ impl World {
             builder.body(BodyDescription {
                 name: organ.name.clone(),
                 mesh: &organ.body,
-                material: if surroundings.mesh_correction {
+                material: if surroundings.mesh_correction && surroundings.backend == Backend::Tetrahedra {
                     element_material(tissue_of(organ), &organ.body)
                 } else {
                     tissue_of(organ)
@@ -164,6 +170,16 @@ impl World {
     /// is shorter if the last tools touch nothing.
     pub fn forces(&self) -> &[ToolForce] {
         self.stepper.forces()
+    }
+
+    /// Force of the tissue of one organ on a tool in the last frame.
+    pub(crate) fn force_of(&self, organ: usize, tool: usize) -> ToolForce {
+        self.stepper.force_of(organ, tool)
+    }
+
+    /// Whether a `tool` is in a hole of an organ.
+    pub(crate) fn is_punctured(&self, organ: usize, tool: usize) -> bool {
+        self.state.holes.iter().any(|hole| hole.body == organ && hole.tools.contains(&tool))
     }
 
     /// Events of grasps in the last frame.

@@ -4,7 +4,7 @@
 #![allow(clippy::print_stdout, reason = "what was measured, for those who ask with --nocapture")]
 
 use glam::{DMat3, DQuat, DVec3};
-use trocar_cell::{Action, ActionSpace, Cell, CellEvent, CellReport, Setpoint, Severance};
+use trocar_cell::{Action, ActionSpace, Cell, CellEvent, CellReport, ContactParts, Setpoint, Severance};
 use trocar_core::Pose;
 use trocar_robot::wrench::ForceKind;
 use trocar_scene::{Arm, Drive, GraspDesignName, Scene, Side};
@@ -158,6 +158,43 @@ fn every_kind_of_arm_lifts_the_tube_by_actions() {
             assert!(!cell.observe()[0].attached && cell.world().state.grasps.is_empty());
         }
     }
+}
+
+/// What the benchmark of grasps compares with: a lift of the same tissue without contact.
+#[test]
+fn a_cell_without_contact_lifts_what_another_has_grasped() {
+    let specimen = two_tubes(ONE_END, 2.2e-3);
+    let mut scene = ideal(false);
+    scene.task.grasp = GraspDesignName::LivePose;
+    let mut with = Cell::new(&scene, &specimen, 1).unwrap();
+    let none = ContactParts { organs: false, instruments: false };
+    let mut without = Cell::with_contact(&scene, &specimen, 1, none).unwrap();
+    let (actions, _) = grasp_and_lift(&mut Cell::new(&scene, &specimen, 1).unwrap(), "left", HELD, 0.015);
+    let held = |cell: &Cell| cell.world().state.grasps.first().map(|grasp| grasp.nodes.clone());
+    let height = |cell: &Cell, nodes: &[u32]| cell.world().state.centroid(&cell.world().model, 0, nodes).z;
+    let mut grasped_at = None;
+    for action in &actions {
+        with.step(action).unwrap();
+        without.step(action).unwrap();
+        without.hold_as(&with);
+        assert_eq!(held(&without), held(&with));
+        if let (None, Some(nodes)) = (grasped_at, held(&with)) {
+            grasped_at = Some([&with, &without].map(|cell| height(cell, &nodes)));
+        }
+    }
+    let nodes = held(&with).unwrap();
+    for (cell, from) in [&with, &without].into_iter().zip(grasped_at.unwrap()) {
+        let lift = height(cell, &nodes) - from;
+        assert!((lift - 0.015).abs() < 0.001, "{lift}");
+    }
+    with.servo_jaw("left", 1.0).unwrap();
+    without.servo_jaw("left", 1.0).unwrap();
+    for _ in 0..6 {
+        with.step(None).unwrap();
+        without.step(None).unwrap();
+        without.hold_as(&with);
+    }
+    assert_eq!([held(&with), held(&without)], [None, None], "both have released");
 }
 
 /// The local model of the tissue predicts the force after a small motion of the tip.

@@ -156,6 +156,27 @@ impl Lattice {
         self.grid.cell
     }
 
+    /// For each node the node of another lattice that it was before a cut. `whole` is that of the
+    /// uncut body, on the same grid; `before` tells which of its elements an element of this
+    /// lattice was. None for nodes that the whole did not have.
+    pub fn nodes_before(&self, whole: &Self, before: impl Fn(u32) -> Option<u32>) -> Vec<Option<u32>> {
+        let offset = ((self.grid.origin - whole.grid.origin) / self.grid.cell).round();
+        let mut nodes = vec![None; self.nodes.len()];
+        for (cell, tet, hex) in &self.pieces {
+            let at = (DVec3::from_array(self.grid.at(*cell).map(|n| n as f64)) + offset).to_array();
+            let inside = |axis: usize| at[axis] >= 0.0 && at[axis] < whole.grid.dims[axis] as f64;
+            let (true, Some(old)) = ((0..3).all(inside), before(*tet)) else { continue };
+            let key = (whole.grid.index(at.map(|n| n as usize)), old);
+            if let Ok(found) = whole.pieces.binary_search_by_key(&key, |piece| (piece.0, piece.1)) {
+                let from = &whole.hexahedra[whole.pieces[found].2 as usize].nodes;
+                for (node, from) in self.hexahedra[*hex as usize].nodes.iter().zip(from) {
+                    nodes[*node as usize] = Some(*from);
+                }
+            }
+        }
+        nodes
+    }
+
     /// The options that it was made with.
     pub fn options(&self) -> &LatticeOptions {
         &self.options

@@ -1,6 +1,7 @@
-//! Deformable tissue on a regular lattice of hexahedra: a second physics beside `trocar-tissue`.
+//! Deformable tissue on a regular lattice of hexahedra: a second physics beside the tetrahedra of
+//! `trocar-tissue`, which has a backend that is made of this crate's elements.
 //!
-//! The two share no mesh, no law and no solver. Where they agree, a result does not depend on
+//! The two share no mesh, no element and no solver. Where they agree, a result does not depend on
 //! either. A [`Lattice`] is cut from a body's tetrahedra: cubic cells, each with the exact volume,
 //! mean and covariance of the material inside it. Parts of a body that lie in one cell without
 //! being connected there get a hexahedron each. A [`Body`] adds a [`Material`] and pins, a
@@ -46,9 +47,11 @@
 
 mod body;
 mod clip;
+mod elastic;
 mod element;
 mod embedding;
 mod error;
+mod flow;
 mod grid;
 mod held;
 mod lattice;
@@ -62,8 +65,10 @@ mod ramify;
 mod symmetric;
 
 pub use body::{Body, BodyDescription, BodyState, Conditions, PointLoad, Spring};
+pub use elastic::RestStiffness;
 pub use embedding::EmbeddedPoint;
 pub use error::{Error, Failure, Result};
+pub use flow::Flow;
 pub use grid::{BoundaryRule, LatticeOptions, MAX_CELLS};
 pub use lattice::{Hexahedron, Lattice};
 pub use material::{Law, Material};

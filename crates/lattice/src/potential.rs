@@ -142,7 +142,7 @@ impl<'a> Potential<'a> {
 }
 
 /// Adds an element's blocks; the matrix keeps one of (a, b) and (b, a).
-fn add_blocks(nodes: [u32; 8], blocks: &Blocks, add: &mut impl FnMut(u32, u32, DMat3)) {
+pub(crate) fn add_blocks(nodes: [u32; 8], blocks: &Blocks, add: &mut impl FnMut(u32, u32, DMat3)) {
     for a in 0..8 {
         for b in 0..=a {
             let block = blocks[a * (a + 1) / 2 + b];

@@ -1,4 +1,4 @@
-//! Eigenvalues and singular values of 3x3 matrices, by Jacobi's rotations.
+//! Eigenvalues and singular values of 3x3 matrices, by Jacobi's rotations; their nearest rotations.
 
 use glam::{DMat3, DVec3};
 
@@ -90,6 +90,41 @@ impl Svd {
         let s = DVec3::new(first.dot(b.x_axis), second.dot(b.y_axis), third.dot(b.z_axis));
         Self { u: DMat3::from_cols(first, second, third), s, v }
     }
+}
+
+/// Greatest number of Newton steps to a rotation; they converge quadratically.
+const MAX_POLAR_STEPS: usize = 12;
+
+/// A step that changes so little (squared) is followed by rounding only.
+const POLAR_TOLERANCE: f64 = 1e-14;
+
+/// Determinant, over the cube of the norm, below which singular values are taken.
+const POLAR_MIN_VOLUME: f64 = 1e-3;
+
+/// The rotation nearest to F: Newton's iteration of Higham, "Computing the polar decomposition -
+/// with applications", 1986.
+pub(crate) fn nearest_rotation(f: DMat3) -> DMat3 {
+    let norm = f.to_cols_array().iter().map(|e| e * e).sum::<f64>().sqrt();
+    let volume = f.determinant();
+    if volume > POLAR_MIN_VOLUME * norm.powi(3) {
+        let mut x = f;
+        for _ in 0..MAX_POLAR_STEPS {
+            let next = (x + cofactor(x) * (1.0 / x.determinant())) * 0.5;
+            let change: f64 = (next - x).to_cols_array().iter().map(|e| e * e).sum();
+            x = next;
+            if change < POLAR_TOLERANCE {
+                return x;
+            }
+        }
+    }
+    let svd = Svd::of(f);
+    svd.u * svd.v.transpose()
+}
+
+/// The cofactor matrix, det(F) F^-T.
+pub(crate) fn cofactor(f: DMat3) -> DMat3 {
+    let [a, b, c] = [f.x_axis, f.y_axis, f.z_axis];
+    DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b))
 }
 
 #[cfg(test)]

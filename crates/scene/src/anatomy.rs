@@ -272,9 +272,18 @@ pub enum ToolContactKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Tissue {
+    /// What bears the tissue: tetrahedra, or a lattice of hexahedra around each organ.
+    #[serde(skip_serializing_if = "is_tetrahedra")]
+    pub backend: BackendName,
+    /// Edge of the lattice's cells (mm); 4 mm if left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cell_mm: Option<f64>,
+    /// Law of a lattice's tissue: stable-neo-hookean (if left out) or corotated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub law: Option<LatticeLaw>,
     /// Schedule: fast (the default solver), paper or adaptive (Vertex Block Descent).
     pub schedule: ScheduleName,
-    /// Whether elements are softer than their organ by what its mesh is too stiff, so that the organ
+    /// Whether tetrahedra are softer than their organ by what its mesh is too stiff, so that the organ
     /// deflects as its material says.
     pub mesh_correction: bool,
     /// Distance at which contact between organs is looked for (mm).
@@ -297,6 +306,9 @@ impl Default for Tissue {
     /// The paper's figures (section IV-C).
     fn default() -> Self {
         Self {
+            backend: BackendName::Tetrahedra,
+            cell_mm: None,
+            law: None,
             schedule: ScheduleName::Fast,
             mesh_correction: false,
             contact_offset_mm: 1.5,
@@ -310,6 +322,34 @@ impl Default for Tissue {
             support: Support::default(),
         }
     }
+}
+
+/// What bears the tissue of a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum BackendName {
+    /// The tetrahedra of the organs.
+    #[default]
+    Tetrahedra,
+    /// A regular lattice of hexahedra around each organ, in which its nodes are embedded.
+    Lattice,
+}
+
+/// A scene on tetrahedra is written as before there were others.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_tetrahedra(backend: &BackendName) -> bool {
+    *backend == BackendName::Tetrahedra
+}
+
+/// Laws of tissue on a lattice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum LatticeLaw {
+    /// Rotated linear elasticity. It turns inside out where jaws squeeze it.
+    Corotated,
+    /// Stable neo-Hookean.
+    #[default]
+    StableNeoHookean,
 }
 
 /// The ground under the organs.

@@ -32,8 +32,8 @@ mod task_name;
 mod variation;
 
 pub use anatomy::{
-    FIELD, MaterialOverride, OrganOverride, PinEnd, PinRule, ScheduleName, Source, SpecimenSource, Support,
-    SupportKind, TOUGHNESS, Tissue, ToolContactKind,
+    BackendName, FIELD, LatticeLaw, MaterialOverride, OrganOverride, PinEnd, PinRule, ScheduleName, Source,
+    SpecimenSource, Support, SupportKind, TOUGHNESS, Tissue, ToolContactKind,
 };
 pub use builtin::{BUILTINS, Builtin};
 pub use camera::{CellCamera, Lens, View};

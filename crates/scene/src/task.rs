@@ -136,33 +136,37 @@ pub struct Safety {
     pub rcm_abort_mm: f64,
     /// Force of tissue on an instrument against which no command pushes it on (N).
     pub force_limit_n: f64,
-    /// The rules of the cell that are applied; all by default.
+    /// An instrument that comes through the surface of an organ punctures it if it pressed on it
+    /// with at least this force (N).
+    pub puncture_force_n: f64,
+    /// What the force guard watches; all by default.
     pub rules: SafetyRules,
 }
 
 impl Default for Safety {
     fn default() -> Self {
-        Self { rcm_threshold_mm: 3.0, rcm_abort_mm: 5.0, force_limit_n: 10.0, rules: SafetyRules::default() }
+        Self {
+            rcm_threshold_mm: 3.0,
+            rcm_abort_mm: 5.0,
+            force_limit_n: 10.0,
+            puncture_force_n: 10.0,
+            rules: SafetyRules::default(),
+        }
     }
 }
 
-/// Which safety rules a cell applies. Each departs from plain physics so that no command breaks
-/// tissue or solver; a study of the tissue alone turns them off.
+/// What the force guard of a cell watches. It stops arms; no rule changes the physics of tissue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SafetyRules {
     /// A command is shortened where tissue pushes back with `force_limit_n`.
     pub force_guard: bool,
-    /// An instrument that has gone through the surface of an organ loses its contact.
-    pub pierce: bool,
-    /// An instrument that strains tissue beyond what tissue bears loses its contact.
-    pub overstretch: bool,
-    /// An organ that stays folded with no instrument at it is relaxed outside of time.
-    pub relax: bool,
+    /// An arm also stops where its instrument strains tissue nearly beyond what tissue bears.
+    pub strain_guard: bool,
 }
 
 impl Default for SafetyRules {
     fn default() -> Self {
-        Self { force_guard: true, pierce: true, overstretch: true, relax: true }
+        Self { force_guard: true, strain_guard: true }
     }
 }

@@ -223,6 +223,26 @@ fn numbers() {
             "port[0].sheet_thickness_mm is 1e300; it must be in [0, 50] mm",
         ),
         Case("jaw_force_n = 0.5", "jaw_force_n = 0§", "instrument[0].jaw_force_n is 0; it must be in [0.01, 40] N"),
+        Case(
+            "schedule = \"fast\" ",
+            "backend = \"latice§\" ",
+            "tissue.backend: unknown variant `latice`, expected `tetrahedra` or `lattice`; did you mean `lattice`?",
+        ),
+        Case(
+            "schedule = \"fast\" ",
+            "cell_mm = 4.0§ ",
+            "tissue.cell_mm is for tissue.backend = 'lattice'; remove it, or set the backend",
+        ),
+        Case(
+            "schedule = \"fast\" ",
+            "backend = \"lattice\"\ncell_mm = 0.2§ ",
+            "tissue.cell_mm is 0.2; it must be in [1, 20]",
+        ),
+        Case(
+            "schedule = \"fast\" ",
+            "backend = \"lattice\"\nschedule = \"paper\"§ ",
+            "tissue.schedule is for tetrahedra; a lattice has one schedule: remove it",
+        ),
         Case("friction = 0.6\n# Organs", "friction = -0.6§\n# Organs", "tissue.friction is -0.6; it must be in [0, 5]"),
         Case("jaw = 0.5", "jaw = 30§", "arm[0].start.jaw is 30; it must be in [0, 1]"),
         Case("control_hz = 30 ", "control_hz = 0§ ", "rates.control_hz is 0; it must be in [1, 1000] Hz"),
@@ -454,6 +474,11 @@ fn parts_fit() {
             "cut_open = 0.50",
             "cut_open = 0.10§",
             "task.gates.cut_open is 0.1; it must be greater than cut_closed (0.15)",
+        ),
+        Case(
+            "puncture_force_n = 10.0",
+            "puncture_force_n = 0.0§",
+            "safety.puncture_force_n is 0; it must be in [0.1, 1000] N",
         ),
         Case(
             "rcm_abort_mm = 5.0",

@@ -113,10 +113,8 @@ row! {
         held_back,
         /// Tissue pushed with more than an arm bears.
         load_limited,
-        /// Contact of the instrument with tissue is disabled: it had pierced or strained it.
-        contact_disabled,
-        /// Contact of the blades alone is disabled: they hold tissue that they had strained.
-        blades_disabled,
+        /// The axis of the instrument is inside an organ that its jaws do not hold.
+        pierces,
         /// The force guard shortened the command.
         guarded,
         /// Largest force of solids on the instrument in a physics step of the period (N): the other
@@ -178,12 +176,14 @@ row! {
         fallbacks,
         /// The tissue diverged.
         diverged,
-        /// Times that contact of an instrument was disabled in the period.
-        disabled_contacts,
-        /// Times that contact of blades alone was disabled.
-        disabled_blades,
-        /// Times that an organ was relaxed outside of time.
-        relaxed,
+        /// Times that an instrument punctured an organ in the period.
+        punctures,
+        /// Times that the axis of an instrument came into an organ with less force than punctures it.
+        pierced,
+        /// Times that an instrument began to strain tissue beyond what tissue bears.
+        overstretched,
+        /// Times that an organ stayed strained with no instrument at it.
+        folded,
         /// Largest motion of any node in the first frame after jaws took hold (mm); 0 where none
         /// did.
         activation_step_mm,

@@ -121,13 +121,6 @@ impl Facts<'_> {
         details
     }
 
-    /// The last grasp ended because contact of the grasper was disabled.
-    pub fn lost_contact(&self) -> bool {
-        let Some(end) = self.rows.iter().rposition(|c| c.task.grasped > 0.0) else { return false };
-        let disabled = |c: &Channels| self.grasper.is_some_and(|side| c.arms()[side as usize].contact_disabled > 0.0);
-        self.rows[end..].iter().take(2).any(disabled)
-    }
-
     fn severed(&self) -> Option<Severed> {
         let mut cuts = self.events.iter().filter_map(|(time, e)| match e {
             CellEvent::Cut { parted: Some(cut), .. } => Some((*time, cut)),

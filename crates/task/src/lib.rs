@@ -27,6 +27,7 @@ mod summary;
 mod supply;
 mod sweep;
 mod visible;
+mod warnings;
 mod why;
 
 pub use bounds::Bounds;
@@ -46,3 +47,4 @@ pub use storage::{ChannelsInfo, Column, read_channels, write_channels};
 pub use summary::{ArmSummary, LOADED_N, Summary};
 pub use supply::{OneSpecimen, SpecimenSupply};
 pub use sweep::{GateRange, Sweep, SweepRow, sweep};
+pub use warnings::Warnings;

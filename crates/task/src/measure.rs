@@ -69,9 +69,10 @@ impl Subject {
             yielded: report.tissue.yielded_substeps as f64,
             fallbacks: report.tissue.fallbacks as f64,
             diverged: flag(report.tissue.divergence.is_some()),
-            disabled_contacts: report.rules.disabled_contacts as f64,
-            disabled_blades: report.rules.disabled_blades as f64,
-            relaxed: report.rules.relaxed as f64,
+            punctures: report.rules.punctures as f64,
+            pierced: report.rules.pierced as f64,
+            overstretched: report.rules.overstretched as f64,
+            folded: report.rules.folded as f64,
             activation_step_mm: 1e3 * report.activation_step,
             ..TaskChannels::default()
         };
@@ -141,7 +142,6 @@ fn arm_channels(cell: &Cell, k: usize, arm: &ArmObservation, bodies: &[usize]) -
     let commanded = space.tip(&arm.commanded).translation;
     let (tip, q) = (arm.tip.translation, upright(arm.tip.rotation));
     let (within, share) = between_blades(cell, k, bodies);
-    let (contact_disabled, blades_disabled) = cell.disabled_contact(name)?;
     // An arm without a port has no pivots and no insertion: its place is that of the tip.
     let in_port = |numbers: [f64; 3]| if space.as_port().is_some() { numbers } else { [0.0; 3] };
     let [a, b, c, roll, jaw] = arm.measured.0;
@@ -184,8 +184,7 @@ fn arm_channels(cell: &Cell, k: usize, arm: &ArmObservation, bodies: &[usize]) -
         rejected_deg: arm.rejected_rotation.length().to_degrees(),
         held_back: flag(arm.held_back),
         load_limited: flag(arm.load_limited),
-        contact_disabled: flag(contact_disabled),
-        blades_disabled: flag(blades_disabled),
+        pierces: flag(cell.pierces(name)?),
         guarded: flag(arm.guarded),
         solid_n: arm.solid_peak,
     })

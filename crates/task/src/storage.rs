@@ -20,23 +20,22 @@ use xxhash_rust::xxh3::Xxh3;
 /// The key of [`ChannelsInfo`] in the file's metadata.
 const KEY: &str = "trocar";
 const FORMAT: &str = "trocar-channels";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// What a column of this version was called in files of an earlier `version`. `None` for one that
 /// they do not have, which is read as zeros.
 fn name_in(version: u32, name: &str) -> Option<String> {
-    if name.ends_with("_solid_n") {
+    let warnings = ["punctures", "pierced", "overstretched", "folded"];
+    if version < 4 && (name.ends_with("_pierces") || warnings.contains(&name)) {
         return None;
     }
-    if version > 1 {
-        return Some(name.to_owned());
-    }
-    let new = ["_blades_disabled", "_guarded"];
-    let task = ["disabled_contacts", "disabled_blades", "relaxed", "activation_step_mm"];
-    if new.iter().any(|end| name.ends_with(end)) || task.contains(&name) {
+    if version < 3 && name.ends_with("_solid_n") {
         return None;
     }
-    Some(name.replace("_contact_disabled", "_unhooked"))
+    if version < 2 && (name.ends_with("_guarded") || name == "activation_step_mm") {
+        return None;
+    }
+    Some(name.to_owned())
 }
 
 /// Most rows of a file: nine hours.

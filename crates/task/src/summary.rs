@@ -4,6 +4,7 @@
 use crate::channels::{ArmChannels, TaskChannels};
 use crate::facts::{Details, Facts};
 use crate::stages::{HELD_FOLLOW, HELD_SLIP_MM};
+use crate::warnings::Warnings;
 use crate::why::why;
 use crate::{Channels, End, Progress};
 use serde::{Deserialize, Serialize};
@@ -52,12 +53,9 @@ pub struct ArmSummary {
     pub peak_solid_n: f64,
     /// Largest tilt (degrees).
     pub tilt_max_deg: f64,
-    /// Periods in which contact of the instrument with tissue was disabled.
-    #[serde(default, alias = "unhooked")]
-    pub contact_disabled: usize,
-    /// Periods in which contact of its blades alone was disabled.
+    /// Periods at whose end its axis was inside an organ that its jaws did not hold.
     #[serde(default)]
-    pub blades_disabled: usize,
+    pub pierces: usize,
     /// Periods in which the force guard shortened its command.
     #[serde(default)]
     pub guarded: usize,
@@ -94,7 +92,7 @@ pub struct Summary {
     /// Follow ratio (tissue lift over jaw lift) then.
     pub follow_ratio: Option<f64>,
     /// The jaws held the tissue then: it followed at least 0.80 of their lift and slipped less than
-    /// 3 mm, and the grasp did not end because contact of the jaws was disabled.
+    /// 3 mm.
     #[serde(default)]
     pub held: bool,
     /// Times that tissue tore out of jaws.
@@ -115,15 +113,9 @@ pub struct Summary {
     pub rcm_peak_mm: f64,
     /// It never went beyond the scene's threshold (3 mm).
     pub rcm_within: bool,
-    /// Times that contact of an instrument with tissue was disabled: a suspension of physics.
-    #[serde(default)]
-    pub disabled_contacts: usize,
-    /// Times that contact of blades that hold tissue was disabled: a suspension of physics.
-    #[serde(default)]
-    pub disabled_blades: usize,
-    /// Times that an organ was relaxed outside of time: a suspension of physics.
-    #[serde(default)]
-    pub relaxed: usize,
+    /// What was beyond what tissue bears.
+    #[serde(flatten)]
+    pub warnings: Warnings,
     /// The arms, left first.
     pub arms: Vec<ArmSummary>,
     /// Why not all stages passed, in one line.
@@ -177,9 +169,7 @@ impl Summary {
             max_speed_m_s: most(|c| c.task.max_speed_m_s),
             rcm_peak_mm,
             rcm_within: rcm_peak_mm <= threshold_mm,
-            disabled_contacts: count(|t| t.disabled_contacts),
-            disabled_blades: count(|t| t.disabled_blades),
-            relaxed: count(|t| t.relaxed),
+            warnings: tasks().map(Warnings::of).sum(),
             arms,
             why: None,
             advice: None,
@@ -191,26 +181,9 @@ impl Summary {
     /// Adds what the channels do not have.
     pub(crate) fn add_facts(&mut self, facts: &Facts<'_>) {
         self.details = facts.details();
-        self.held &= !facts.lost_contact();
         self.why = why(facts.rows, facts, &self.progress, self.end.as_ref());
         let slipped = self.attached && !self.held && !self.diverged && self.torn == 0;
         self.advice = if slipped { facts.advice() } else { None };
-    }
-
-    /// Suspensions of physics in a few words; `None` without any.
-    pub fn suspensions(&self) -> Option<String> {
-        let said = |n: usize, one: &str, many: &str| match n {
-            0 => None,
-            1 => Some(format!("1 {one}")),
-            n => Some(format!("{n} {many}")),
-        };
-        let all = [
-            said(self.disabled_contacts, "contact disabled", "contacts disabled"),
-            said(self.disabled_blades, "contact of blades disabled", "contacts of blades disabled"),
-            said(self.relaxed, "organ relaxed", "organs relaxed"),
-        ];
-        let all: Vec<String> = all.into_iter().flatten().collect();
-        (!all.is_empty()).then(|| all.join(", "))
     }
 
     /// When the stage of that name passed (s).
@@ -263,8 +236,7 @@ fn arm(name: &str, rows: &[Channels]) -> ArmSummary {
         peak_jaw_n: most(|a| a.jaw_force_n),
         peak_solid_n: most(|a| a.solid_n),
         tilt_max_deg: most(|a| a.tilt_deg),
-        contact_disabled: all.iter().filter(|a| a.contact_disabled > 0.0).count(),
-        blades_disabled: all.iter().filter(|a| a.blades_disabled > 0.0).count(),
+        pierces: all.iter().filter(|a| a.pierces > 0.0).count(),
         guarded: all.iter().filter(|a| a.guarded > 0.0).count(),
     }
 }

@@ -49,9 +49,6 @@ impl Reason<'_, '_> {
     /// The jaws never held the organ where the gate wants it.
     fn no_grasp(&self) -> String {
         let (organ, gates) = (&self.facts.task.organ, &self.facts.task.gates);
-        if let Some(said) = self.disabled() {
-            return said;
-        }
         let attached = self.facts.events.iter().rev().find_map(|(time, e)| match e {
             CellEvent::Attached { arm, organ, s, .. } if Some(*arm) == self.facts.grasper => Some((*time, organ, *s)),
             _ => None,
@@ -70,18 +67,18 @@ impl Reason<'_, '_> {
         let jaw = |c: &&Channels| self.grasper(c).is_some_and(|arm| arm.jaw < CLOSED_JAW && arm.attached == 0.0);
         if let Some(closed) = self.rows.iter().find(jaw) {
             let (time, mm) = (closed.time_s, closed.task.grasp_distance_mm);
-            let disabled = self.facts.events.iter().rev().find_map(|(at, e)| match e {
-                CellEvent::ContactDisabled { arm, organ, .. } if self.grasps(*arm) && *at <= time + 1e-9 => {
+            let strained = self.facts.events.iter().rev().find_map(|(at, e)| match e {
+                CellEvent::Pierced { arm, organ } | CellEvent::Overstretched { arm, organ, .. }
+                    if self.grasps(*arm) && *at <= time + 1e-9 =>
+                {
                     Some((*at, organ))
                 }
                 _ => None,
             });
-            if let Some((at, organ)) = disabled {
-                return format!(
-                    "contact disabled: at {at:.1} s the grasper had pierced or strained the {organ}; it then closed on nothing"
-                );
-            }
-            return format!("empty jaws: they closed on nothing at {time:.1} s, {mm:.0} mm from the {organ}");
+            let before = strained.map_or_else(String::new, |(at, organ)| {
+                format!("; at {at:.1} s the grasper had pierced or overstretched the {organ}")
+            });
+            return format!("empty jaws: they closed on nothing at {time:.1} s, {mm:.0} mm from the {organ}{before}");
         }
         format!("no grasp: the jaws came within {nearest:.0} mm of the {organ} and did not close on it")
     }
@@ -89,9 +86,6 @@ impl Reason<'_, '_> {
     /// The jaws held the organ and do not any more.
     fn lost_grasp(&self) -> String {
         let organ = &self.facts.task.organ;
-        if let Some(said) = self.disabled() {
-            return said;
-        }
         let events = self.facts.events;
         let attached = |e: &CellEvent| matches!(e, CellEvent::Attached { arm, .. } if self.grasps(*arm));
         let from = events.iter().rposition(|(_, e)| attached(e)).map_or(0, |k| k + 1);
@@ -100,9 +94,6 @@ impl Reason<'_, '_> {
             _ => None,
         });
         let ended = events[from..].iter().find_map(|(time, e)| match e {
-            CellEvent::ContactDisabled { arm, organ, .. } if self.grasps(*arm) => Some(format!(
-                "contact disabled: at {time:.1} s the grasper had pierced or strained the {organ} and let go of it"
-            )),
             CellEvent::Torn { arm, force_n } if self.grasps(*arm) => {
                 Some(format!("torn: the {organ} tore out of the jaws at {time:.1} s, at {force_n:.1} N"))
             }
@@ -124,24 +115,6 @@ impl Reason<'_, '_> {
     /// Whether `arm` is the one with the first grasper.
     fn grasps(&self, arm: Side) -> bool {
         Some(arm) == self.facts.grasper
-    }
-
-    /// Contact of the grasper is disabled at the end.
-    fn disabled(&self) -> Option<String> {
-        let last = self.rows.last()?;
-        if self.grasper(last)?.contact_disabled == 0.0 {
-            return None;
-        }
-        let said = self.facts.events.iter().rev().find_map(|(time, e)| match e {
-            CellEvent::ContactDisabled { arm, organ, .. } if Some(*arm) == self.facts.grasper => Some((*time, organ)),
-            _ => None,
-        });
-        Some(match said {
-            Some((time, organ)) => format!(
-                "contact disabled: since {time:.1} s tissue does not feel the grasper, which had pierced or strained the {organ}"
-            ),
-            None => "contact disabled: tissue does not feel the grasper".to_owned(),
-        })
     }
 
     fn grasper<'c>(&self, row: &'c Channels) -> Option<&'c crate::ArmChannels> {

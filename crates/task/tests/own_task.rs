@@ -154,7 +154,7 @@ fn wide_organs_are_pinched() {
     let mut scripted = policy::named("scripted").unwrap();
     let recording = run(&mut episode, scripted.as_mut(), 1, &mut |_| true).unwrap();
     assert!(recording.summary.passed, "{:?}", recording.summary.why);
-    assert!(recording.channels.iter().all(|row| row.task.disabled_contacts == 0.0));
+    assert!(recording.channels.iter().all(|row| row.task.pierced == 0.0));
 }
 
 /// Holds the arms where they are for some periods; then it has nothing left to do.

@@ -6,7 +6,7 @@ use crate::frame::Frame;
 use crate::report::Measured;
 use crate::state::BodyState;
 use crate::untangle::Untangler;
-use crate::{Body, StepReport};
+use crate::{Body, StepReport, ToolForce};
 use rayon::prelude::*;
 
 /// The solver of one body with its scratch memory.
@@ -35,6 +35,12 @@ pub(crate) trait Solver: Send + Sync + Sized {
 
     /// What the body touched in the last frame. None for a solver without contact with tools.
     fn contacts(&self) -> Option<&ContactSet> {
+        None
+    }
+
+    /// Forces of rigidly held vertices on each tool at the end of the last frame, for a solver that
+    /// knows them. Others have them from the stress of the tetrahedra.
+    fn held_forces(&self) -> Option<&[ToolForce]> {
         None
     }
 
@@ -93,14 +99,20 @@ impl<S: Solver> BodySlot<S> {
     pub fn begin_frame(&mut self, state: &mut BodyState, frame: &Frame<'_>) {
         self.report = StepReport::default();
         self.before.copy_from(state);
-        self.untangler.untangle(&frame.of(self.index), &self.body, state);
+        // Tetrahedra in a lattice bear nothing.
+        if self.body.lattice.is_none() {
+            self.untangler.untangle(&frame.of(self.index), &self.body, state);
+        }
     }
 
     /// Measures the body at the end of a frame: speeds, volumes, and what it does to the tools.
     pub fn measure(&mut self, frame: &Frame<'_>) {
         let Self { index, body, solver, state, report, reaction, measured, .. } = self;
         report.measure(*index, body, state, measured);
-        reaction.take(&frame.of(*index), body, state, solver.contacts().is_none());
+        match solver.held_forces() {
+            Some(forces) => reaction.set(forces),
+            None => reaction.take(&frame.of(*index), body, state, solver.contacts().is_none()),
+        }
     }
 }
 

@@ -9,8 +9,9 @@ use crate::body::groups::Groups;
 use crate::body::strip::{Push, strip};
 use crate::body::surface::Surface;
 use crate::body::{BodyData, Corner, Edge, Vertex};
+use crate::lattice::Embedding;
 use crate::{
-    Body, BodyContact, Collider, ConstitutiveModel, Error, Material, Model, Result, StableNeoHookean, Support,
+    Backend, Body, BodyContact, Collider, ConstitutiveModel, Error, Material, Model, Result, StableNeoHookean, Support,
     ToolContact,
 };
 use glam::{DVec3, Vec3A};
@@ -69,6 +70,7 @@ pub struct ModelBuilder {
     colliders: Vec<Collider>,
     body_contact: Option<BodyContact>,
     tool_contact: ToolContact,
+    backend: Backend,
 }
 
 impl Default for ModelBuilder {
@@ -89,6 +91,7 @@ impl ModelBuilder {
             colliders: Vec::new(),
             body_contact: None,
             tool_contact: ToolContact::default(),
+            backend: Backend::default(),
         }
     }
 
@@ -113,6 +116,13 @@ impl ModelBuilder {
         self
     }
 
+    /// Sets what bears the tissue of all bodies; [`Backend::Tetrahedra`] otherwise. To be called
+    /// before bodies are added.
+    pub fn backend(mut self, backend: Backend) -> Self {
+        self.backend = backend;
+        self
+    }
+
     /// Adds a body; returns its index.
     ///
     /// # Errors
@@ -134,7 +144,11 @@ impl ModelBuilder {
                 self.contact_stiffness
             )));
         }
-        self.bodies.push(lay_out(body, self.mass_floor, self.contact_stiffness, None));
+        let mut body = lay_out(body, self.mass_floor, self.contact_stiffness, None);
+        if let Backend::Lattice(settings) = self.backend {
+            body.lattice = Embedding::of(&body, settings)?;
+        }
+        self.bodies.push(body);
         Ok(self.bodies.len() - 1)
     }
 
@@ -204,6 +218,7 @@ impl ModelBuilder {
             colliders: self.colliders,
             body_contact: self.body_contact,
             tool_contact: self.tool_contact,
+            backend: self.backend,
         })
     }
 }
@@ -300,6 +315,7 @@ pub(crate) fn lay_out(
         groups: Groups::default(),
         elements: None,
         volumes,
+        lattice: None,
         name,
     };
     body.tets = mesh.tets.iter().map(|t| t.map(|i| body.internal[i as usize])).collect();

@@ -1,7 +1,7 @@
 //! What acts on a model during one frame, as its bodies see it.
 
 use crate::grasp::travel;
-use crate::{Body, Collider, Grasp, Load, ToolContact, ToolMotion};
+use crate::{Body, Collider, Grasp, Hole, Load, ToolContact, ToolMotion};
 use glam::{DVec3, Vec3A};
 
 /// What acts on a body from outside during one frame.
@@ -15,6 +15,8 @@ pub(crate) struct Frame<'a> {
     pub index: usize,
     /// All grasps in force.
     pub grasps: &'a [Grasp],
+    /// All holes through which tools pass.
+    pub holes: &'a [Hole],
     /// Motions of the tools, by tool.
     pub tools: &'a [ToolMotion],
     /// Forces on nodes.

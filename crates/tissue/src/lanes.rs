@@ -4,7 +4,7 @@
 //! Every operation is one IEEE operation a lane, none is fused, and sums have a fixed order: all
 //! instruction sets give the same bits.
 
-use fearless_simd::{Simd, SimdBase, SimdCombine, f32x4, f32x16};
+use fearless_simd::{Level, Simd, SimdBase, SimdCombine, dispatch, f32x4, f32x16};
 use std::ops::{Add, Mul, Sub};
 
 /// Lanes of a vector.
@@ -166,6 +166,15 @@ pub(crate) fn dot_rows<S: Simd>(simd: S, a: &[Row], b: &[Row]) -> f32 {
         sum += f32x16::from_slice(simd, a) * f32x16::from_slice(simd, b);
     }
     add_up(sum)
+}
+
+/// Whether two vectors of rows are the same, number by number.
+pub(crate) fn same_rows(level: Level, a: &[Row], b: &[Row]) -> bool {
+    // Chunks are compared whole, so that their numbers are compared at once.
+    const CHUNK: usize = 16 * LANES;
+    let differ = |a: &[f32], b: &[f32]| a.iter().zip(b).fold(false, |differ, (a, b)| differ | (a != b));
+    let (a, b) = (a.as_flattened(), b.as_flattened());
+    a.len() == b.len() && dispatch!(level, _simd => a.chunks(CHUNK).zip(b.chunks(CHUNK)).all(|(a, b)| !differ(a, b)))
 }
 
 /// a += k b over rows.

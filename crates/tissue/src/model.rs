@@ -1,6 +1,6 @@
 //! What never changes while stepping.
 
-use crate::{Body, BodyContact, Collider, ToolContact};
+use crate::{Backend, Body, BodyContact, Collider, ToolContact};
 use glam::DVec3;
 
 /// Everything that is constant over a simulation. Only [`crate::ModelBuilder`] and [`crate::sever`]
@@ -14,6 +14,7 @@ pub struct Model {
     pub(crate) colliders: Vec<Collider>,
     pub(crate) body_contact: Option<BodyContact>,
     pub(crate) tool_contact: ToolContact,
+    pub(crate) backend: Backend,
 }
 
 impl Model {
@@ -40,6 +41,11 @@ impl Model {
     /// What of the bodies' surfaces touches tools.
     pub fn tool_contact(&self) -> ToolContact {
         self.tool_contact
+    }
+
+    /// What bears the tissue.
+    pub fn backend(&self) -> Backend {
+        self.backend
     }
 
     /// Whether bodies `a` and `b` touch each other: both exist, and the pair was not filtered

@@ -4,10 +4,13 @@ use crate::contact::ToolGroup;
 use crate::descent::TouchingDescent;
 use crate::external::{ExternalSolver, Integrator};
 use crate::frame::Frame;
+use crate::lattice::LatticeSolver;
 use crate::quasi_newton::QuasiNewtonSolver;
 use crate::report::Divergence;
 use crate::solver_set::{BodySolvers, SolverSet};
-use crate::{Body, Error, Event, Load, Model, Result, SolverSettings, State, StepReport, ToolForce, ToolMotion};
+use crate::{
+    Backend, Body, Error, Event, Load, Model, Result, SolverSettings, State, StepReport, ToolForce, ToolMotion,
+};
 use glam::DVec3;
 
 /// Advances states of one model.
@@ -22,6 +25,7 @@ pub struct Stepper {
     /// None: the calling thread does the work.
     pool: Option<rayon::ThreadPool>,
     solvers: Box<dyn SolverSet>,
+    backend: Backend,
     forces: Vec<ToolForce>,
     events: Vec<Event>,
 }
@@ -35,7 +39,7 @@ impl Stepper {
     pub fn new(model: &Model, settings: SolverSettings, dt: f64, threads: usize) -> Result<Self> {
         settings.check()?;
         let threaded_bodies = matches!(settings, SolverSettings::Descent(_));
-        Self::with_solvers(model, solvers(settings, dt), threaded_bodies, dt, threads)
+        Self::with_solvers(model, solvers(model.backend, settings, dt), threaded_bodies, dt, threads)
     }
 
     /// Prepares to step with an integrator from outside this crate: `make` makes the one of each
@@ -64,7 +68,8 @@ impl Stepper {
             return Err(Error::Model(format!("a frame of {dt} s; must be in (0, 10]")));
         }
         let (forces, events) = (Vec::new(), Vec::new());
-        let mut stepper = Self { dt, threaded_bodies, threads, pool: None, solvers, forces, events };
+        let backend = model.backend;
+        let mut stepper = Self { dt, threaded_bodies, threads, pool: None, solvers, backend, forces, events };
         stepper.set_model(model)?;
         Ok(stepper)
     }
@@ -76,8 +81,14 @@ impl Stepper {
     /// with the same bits as in a new stepper.
     ///
     /// # Errors
-    /// Threads that the system refuses; the stepper then still steps the old model.
+    /// A model of another backend, and threads that the system refuses; the stepper then still steps
+    /// the old model.
     pub fn set_model(&mut self, model: &Model) -> Result<()> {
+        if self.backend != model.backend {
+            return Err(Error::Model(
+                "the model has another backend than the stepper's; make another stepper".to_owned(),
+            ));
+        }
         // Handing a small model to a pool costs more than a frame.
         let single_body = !self.threaded_bodies && model.bodies.len() == 1;
         let single_thread = self.threads == 1 || single_body;
@@ -111,19 +122,29 @@ impl Stepper {
         if let Some(why) = self.refusal(model, state, loads) {
             return StepReport { divergence: Some(why), ..StepReport::default() };
         }
-        let grasps = std::mem::take(&mut state.grasps);
+        let (grasps, holes) = (std::mem::take(&mut state.grasps), std::mem::take(&mut state.holes));
         let (dt, gravity) = (self.dt, model.gravity);
         let (colliders, tool_contact) = (&model.colliders[..], model.tool_contact);
         let single_thread = self.pool.is_none();
-        let frame =
-            Frame { dt, gravity, index: 0, grasps: &grasps, tools, loads, colliders, tool_contact, single_thread };
+        let frame = Frame {
+            dt,
+            gravity,
+            index: 0,
+            grasps: &grasps,
+            holes: &holes,
+            tools,
+            loads,
+            colliders,
+            tool_contact,
+            single_thread,
+        };
 
         self.solvers.begin_frame(state, &frame);
         self.solvers.build_islands(model, state, &frame);
         self.solvers.solve_islands(state, &frame, self.pool.as_ref());
         let report = self.solvers.end_frame(state);
 
-        state.grasps = grasps;
+        (state.grasps, state.holes) = (grasps, holes);
         if !matches!(report.divergence, Some(Divergence::NonFinite { .. })) {
             state.time += dt;
             self.sum_tool_forces(tools.len());
@@ -134,7 +155,7 @@ impl Stepper {
 
     /// Why a frame cannot be stepped, if it cannot.
     fn refusal(&self, model: &Model, state: &State, loads: &[Load]) -> Option<Divergence> {
-        if !self.solvers.fits(model, state) || !state.grasps_fit(model) {
+        if !self.solvers.fits(model, state) || !state.names_nodes_of(model) {
             return Some(Divergence::OtherModel);
         }
         (!loads.iter().all(|load| load.fits(model))).then_some(Divergence::WrongLoad)
@@ -174,6 +195,19 @@ impl Stepper {
         &self.forces
     }
 
+    /// Force of one body on a tool in the last frame; zero before the first one.
+    pub fn force_of(&self, body: usize, tool: usize) -> ToolForce {
+        let mut sum = ToolForce::default();
+        self.solvers.for_bodies(&mut |index, reaction, contacts| {
+            let contacts = contacts.filter(|_| index == body).map_or(&[][..], |contacts| contacts.forces());
+            let constraints = if index == body { reaction.forces() } else { &[] };
+            for part in [constraints, contacts] {
+                part.get(tool).into_iter().for_each(|force| sum.add(force));
+            }
+        });
+        sum
+    }
+
     /// How the force of tissue on `tools` changes when they move together, as one rigid body: about
     /// the point `about` (m), the wrench on them (N, N m) changes by minus this matrix times the
     /// motion (translation (m), rotation vector (rad)) of a frame.
@@ -188,7 +222,7 @@ impl Stepper {
     /// Zero with solvers other than [`SolverSettings::QuasiNewton`], which have no matrix.
     pub fn tool_stiffness(&mut self, model: &Model, state: &State, tools: &[usize], about: DVec3) -> [[f64; 6]; 6] {
         let mut sum = [[0.0; 6]; 6];
-        if self.solvers.fits(model, state) && state.grasps_fit(model) {
+        if self.solvers.fits(model, state) && state.names_nodes_of(model) {
             let group = ToolGroup { dt: self.dt, tools, about, grasps: &state.grasps, colliders: &model.colliders };
             self.solvers.add_tool_stiffness(&group, &mut sum);
         }
@@ -219,8 +253,12 @@ impl Stepper {
     }
 }
 
-/// The solvers of these settings.
-fn solvers(settings: SolverSettings, dt: f64) -> Box<dyn SolverSet> {
+/// The solvers of these settings. Those of lattices are one method, which takes substeps and tolerances
+/// from them.
+fn solvers(backend: Backend, settings: SolverSettings, dt: f64) -> Box<dyn SolverSet> {
+    if let Backend::Lattice(_) = backend {
+        return Box::new(BodySolvers::new(move |body, _| LatticeSolver::new(settings, body)));
+    }
     match settings {
         SolverSettings::QuasiNewton(method) => Box::new(BodySolvers::new(move |body, single_thread| {
             QuasiNewtonSolver::new(method, body, dt, single_thread)

@@ -163,6 +163,7 @@ mod tests {
             gravity: DVec3::ZERO,
             index: 0,
             grasps: &[],
+            holes: &[],
             tools: &[],
             loads: &[],
             colliders: &[],

@@ -8,7 +8,7 @@ use trocar_core::Pose;
 use trocar_geometry::TetMesh;
 use trocar_testing::blocks::{FRAME, GRAVITY, block, nodes, tissue};
 use trocar_tissue::{
-    BodyDescription, Collider, Material, Model, ModelBuilder, Shape, SolverSettings, State, Stepper, ToolContact,
+    BodyDescription, Collider, Hole, Material, Model, ModelBuilder, Shape, SolverSettings, State, Stepper, ToolContact,
     ToolMotion,
 };
 
@@ -161,4 +161,46 @@ fn it_repeats_to_the_bit() {
     };
     assert_eq!(run(1, false), run(2, false));
     assert_eq!(run(1, false), run(1, true));
+}
+
+/// Force of the block on two equal rods that come 1 mm into its top, 18 mm apart (N), when the first
+/// is in a hole.
+fn forces_at_a_hole(schedule: SolverSettings, hole: bool) -> [f64; 2] {
+    let mesh = block([6, 6, 3], 6e-3);
+    let mut builder = ModelBuilder::new().gravity(GRAVITY).tool_contact(ToolContact::Surface);
+    let material = Material { viscosity: 60.0, ..tissue(12e3) };
+    let pinned = nodes(&mesh, |p| p.z == 0.0);
+    builder.body(BodyDescription { name: "tissue".into(), mesh: &mesh, material, pinned, supports: vec![] }).unwrap();
+    let places = [9e-3, 27e-3].map(|x| DVec3::new(x, 18e-3, 18e-3 + RADIUS - 1e-3));
+    for (tool, place) in places.iter().enumerate() {
+        let shape = Shape::Capsule { ends: [DVec3::ZERO, 5e-3 * DVec3::Z], radius: RADIUS };
+        builder.collider(Collider { name: "rod".into(), tool, shape, rest_offset: 0.0, friction: 0.3 }).unwrap();
+        assert!(mesh.vertices.iter().any(|p| p.distance(*place) < 8e-3), "there is tissue at {place}");
+    }
+    let model = builder.build().unwrap();
+    let mut state = State::new(&model);
+    if hole {
+        let nodes = nodes(&mesh, |p| p.distance(places[0]) < 9e-3);
+        state.holes.push(Hole { body: 0, tools: vec![0], nodes });
+    }
+    let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
+    let motions = places.map(|place| ToolMotion { from: at(place), to: at(place) });
+    for _ in 0..20 {
+        assert_eq!(stepper.step(&model, &mut state, &motions).divergence, None);
+    }
+    let all = stepper.forces().iter().map(|force| force.contact.force.length()).collect::<Vec<_>>();
+    assert_eq!(stepper.force_of(0, 1), stepper.forces()[1]);
+    assert_eq!(state.holes.len(), usize::from(hole));
+    [all[0], all[1]]
+}
+
+#[test]
+fn a_hole_lets_its_tool_through_and_no_other() {
+    for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
+        let [one, other] = forces_at_a_hole(schedule, false);
+        assert!(one > 0.01 && other > 0.01, "{one} N, {other} N");
+        let [through, beside] = forces_at_a_hole(schedule, true);
+        println!("{one:.3} N and {other:.3} N; with a hole {through} N and {beside:.3} N");
+        assert!(through == 0.0 && (beside / other - 1.0).abs() < 0.1, "{through} N, {beside} N");
+    }
 }

@@ -1,7 +1,7 @@
 //! The numbers of an arm in a frame.
 
 /// Names of the numbers of an arm in a frame.
-pub(crate) const ARM_COLUMNS: [&str; 45] = [
+pub(crate) const ARM_COLUMNS: [&str; 44] = [
     "tip_x_m",
     "tip_y_m",
     "tip_z_m",
@@ -41,8 +41,7 @@ pub(crate) const ARM_COLUMNS: [&str; 45] = [
     "held_back",
     "guarded",
     "load_limited",
-    "contact_disabled",
-    "blades_disabled",
+    "pierces",
     "held_organ",
     "held_s",
     "follow",

@@ -119,7 +119,6 @@ impl Taker {
         let carried = cell.carried(k);
         let organ = carried.and_then(|c| self.topology.bodies.iter().position(|own| own.contains(&c.organ)));
         let follow = carried.map_or(0.0, |c| if c.jaw_lift.abs() > 1e-4 { c.tissue_lift / c.jaw_lift } else { 0.0 });
-        let (disabled, blades) = cell.disabled_contact(name)?;
         let numbers = [
             &pose_numbers(&arm.tip)[..],
             &[arm.measured.jaw(), gripper.jaw_angle],
@@ -129,7 +128,7 @@ impl Taker {
             &arm.contact.to_array(),
             &arm.constraint.to_array(),
             &[arm.jaw_force, 1e3 * arm.rcm_deviation, 1e3 * arm.rcm_peak],
-            &[arm.attached, arm.held_back, arm.guarded, arm.load_limited, disabled, blades].map(flag),
+            &[arm.attached, arm.held_back, arm.guarded, arm.load_limited, cell.pierces(name)?].map(flag),
             &[organ.map_or(-1.0, |k| k as f64), carried.map_or(0.0, |c| c.s)],
             &[follow, carried.map_or(0.0, |c| 1e3 * c.slip)],
         ];

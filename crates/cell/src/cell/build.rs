@@ -107,6 +107,7 @@ fn arm(scene: &Scene, k: usize, tool: &Tool<'_>, floor: f64) -> Result<ArmUnit> 
         parts: blades.colliders(Tools::of(k)),
         force_limit: if scene.safety.rules.force_guard { scene.safety.force_limit_n } else { f64::INFINITY },
         stop_force: scene.safety.force_limit_n,
+        puncture_force: scene.safety.puncture_force_n,
         rcm_limits: [1e-3 * scene.safety.rcm_threshold_mm, 1e-3 * scene.safety.rcm_abort_mm],
         tear_force: scene.tissue.tear_force_n,
         period: 1.0 / f64::from(scene.rates.control_hz),

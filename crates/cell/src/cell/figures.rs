@@ -71,14 +71,12 @@ impl Cell {
         Ok(arm.drive.tip().transform(arm.model.blades.length * DVec3::X))
     }
 
-    /// Whether contact of an arm's instrument with tissue is disabled, and whether that of its
-    /// blades is.
+    /// Whether the axis of an arm's instrument is inside an organ that its jaws do not hold.
     ///
     /// # Errors
     /// An arm that the cell does not have.
-    pub fn disabled_contact(&self, arm: &str) -> Result<(bool, bool)> {
-        let state = &self.arm(arm)?.state;
-        Ok((state.contact_disabled, state.blades_disabled))
+    pub fn pierces(&self, arm: &str) -> Result<bool> {
+        Ok(self.arm(arm)?.state.pierces)
     }
 
     /// Largest distance of a pinned node from its recorded position (m). A state stores positions

@@ -1,45 +1,44 @@
-//! Whether a segment lies inside an organ.
+//! The parts of segments that lie inside an organ.
 
 use crate::World;
 use glam::DVec3;
 
-/// The first organ except `spared` that contains a part of one of `segments`, and where (m).
-/// Elements whose nodes are all pinned do not count.
-pub(super) fn first_organ_around(
-    world: &World,
-    segments: &[[DVec3; 2]],
-    spared: Option<usize>,
-) -> Option<(usize, DVec3)> {
-    let ends = segments.iter().flatten();
-    let (low, high) = ends.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
-    let mut places = Vec::new();
-    let mut sides = Vec::new();
-    for (k, body) in world.model.bodies().iter().enumerate().filter(|(k, _)| Some(*k) != spared) {
-        places.clear();
-        sides.clear();
-        for i in 0..body.len() {
-            let p = world.state.position(&world.model, k, i);
-            places.push(p);
-            sides.push(p.cmplt(low).bitmask() | p.cmpgt(high).bitmask() << 3);
-        }
-        let pinned = body.pinned();
-        for tet in body.tets() {
-            let t = tet.map(|i| i as usize);
-            // All corners are beyond one side of the box round the segments.
-            if t.iter().fold(u32::MAX, |all, i| all & sides[*i]) != 0 || t.iter().all(|i| pinned[*i]) {
-                continue;
-            }
-            let corners = t.map(|i| places[i]);
-            if let Some(at) = segments.iter().find_map(|s| inside(&corners, s)) {
-                return Some((k, at));
-            }
-        }
-    }
-    None
+/// A part of a segment inside an element of an organ.
+pub(super) struct Crossing {
+    /// The segment's number.
+    pub segment: usize,
+    /// The part inside, as shares of the segment.
+    pub part: [f64; 2],
+    /// The element's nodes.
+    pub nodes: [u32; 4],
 }
 
-/// The middle of the part of a segment inside a tetrahedron, if there is one.
-fn inside(corners: &[DVec3; 4], [from, to]: &[DVec3; 2]) -> Option<DVec3> {
+/// The parts of `segments` inside an organ, by element. Elements whose nodes are all pinned do not
+/// count.
+pub(super) fn crossings(world: &World, organ: usize, segments: &[[DVec3; 2]]) -> Vec<Crossing> {
+    let ends = segments.iter().flatten();
+    let (low, high) = ends.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
+    let body = &world.model.bodies()[organ];
+    let places = world.state.positions(&world.model, organ);
+    let side = |p: &DVec3| p.cmplt(low).bitmask() | p.cmpgt(high).bitmask() << 3;
+    let sides: Vec<u32> = places.iter().map(side).collect();
+    let pinned = body.pinned();
+    let mut found = Vec::new();
+    for nodes in body.tets() {
+        let t = nodes.map(|i| i as usize);
+        // All corners are beyond one side of the box round the segments.
+        if t.iter().fold(u32::MAX, |all, i| all & sides[*i]) != 0 || t.iter().all(|i| pinned[*i]) {
+            continue;
+        }
+        let corners = t.map(|i| places[i]);
+        let crossing = |(segment, ends)| Some(Crossing { segment, part: inside(&corners, ends)?, nodes: *nodes });
+        found.extend(segments.iter().enumerate().filter_map(crossing));
+    }
+    found
+}
+
+/// The part of a segment inside a tetrahedron, as shares of the segment, if there is one.
+fn inside(corners: &[DVec3; 4], [from, to]: &[DVec3; 2]) -> Option<[f64; 2]> {
     let (mut begin, mut end) = (0.0_f64, 1.0_f64);
     // Each face with the corner opposite to it.
     for [a, b, c, d] in [[0, 1, 2, 3], [0, 3, 1, 2], [0, 2, 3, 1], [1, 3, 2, 0]] {
@@ -57,7 +56,7 @@ fn inside(corners: &[DVec3; 4], [from, to]: &[DVec3; 2]) -> Option<DVec3> {
             end = end.min(share);
         }
     }
-    (begin < end).then(|| from.lerp(*to, 0.5 * (begin + end)))
+    (begin < end).then_some([begin, end])
 }
 
 #[cfg(test)]
@@ -67,7 +66,10 @@ mod tests {
     #[test]
     fn what_of_a_segment_is_inside_a_tetrahedron_is_found() {
         let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
-        let at = |from: [f64; 3], to: [f64; 3]| inside(&corners, &[from.into(), to.into()]);
+        let at = |from: [f64; 3], to: [f64; 3]| {
+            let [begin, end] = inside(&corners, &[from.into(), to.into()])?;
+            Some(DVec3::from(from).lerp(to.into(), 0.5 * (begin + end)))
+        };
         let near = |at: Option<DVec3>, to: [f64; 3]| at.is_some_and(|at| at.distance(to.into()) < 1e-12);
         assert!(near(at([0.1, 0.1, -1.0], [0.1, 0.1, 1.8]), [0.1, 0.1, 0.4]));
         assert!(near(at([0.1, 0.1, 0.1], [0.1, 0.1, 0.3]), [0.1, 0.1, 0.2]), "all of it");

@@ -17,6 +17,7 @@ mod inside;
 mod link_poses;
 mod period;
 mod placed;
+mod pressed;
 mod reach;
 mod report;
 mod restart;
@@ -48,10 +49,10 @@ pub use workspace::{FreeSpace, PortSpace, Reached, Workspace};
 use crate::{Error, Result, World};
 use arm::ArmUnit;
 use delay::{Delay, Waiting};
-use rules::Edges;
+use rules::{Edges, OrganWatch};
 use solid::{PinnedSurface, Solids};
 use std::time::Duration;
-use trocar_scene::{SafetyRules, Scene};
+use trocar_scene::Scene;
 use trocar_specimen::Specimen;
 use trocar_tissue::ToolMotion;
 
@@ -101,8 +102,8 @@ pub struct Cell {
     waiting: Waiting,
     /// Whether cuts sever tissue.
     sever: bool,
-    /// The safety rules that are applied.
-    rules: SafetyRules,
+    /// Whether the force guard sees the strain of tissue.
+    strain_guard: bool,
     /// Motions of the tools in the last frame.
     motions: Vec<ToolMotion>,
     edges: Edges,
@@ -111,7 +112,7 @@ pub struct Cell {
     /// Which contacts there are.
     contact: ContactParts,
     /// By body: frames for which it has been strained without an instrument at it.
-    waits: Vec<u32>,
+    watches: Vec<OrganWatch>,
     /// Whether the instruments touch and that was reported.
     touch: bool,
     timing: Timing,
@@ -148,9 +149,9 @@ impl Cell {
         Ok(Self {
             motions: Vec::with_capacity(3 * arms.len()),
             edges: Edges::of(&world),
-            solids: Solids { bed, pinned },
+            solids: Solids { bed, pinned, holes: Vec::new() },
             contact,
-            waits: vec![0; world.model.bodies().len()],
+            watches: vec![OrganWatch::default(); world.model.bodies().len()],
             touch: false,
             world,
             arms,
@@ -161,7 +162,7 @@ impl Cell {
             delay: Delay::new(1e-3 * scene.rates.control_delay_ms, scene.rates.physics_hz, frames * physics_steps),
             waiting: Waiting::default(),
             sever: scene.task.sever,
-            rules: scene.safety.rules,
+            strain_guard: scene.safety.rules.strain_guard,
             timing: Timing::default(),
         })
     }
@@ -202,9 +203,17 @@ impl Cell {
     }
 
     /// Whether the axis of an instrument's part lies inside an organ, by arm: privileged. Held tissue,
-    /// and tissue that blades shear, does not count.
+    /// tissue that blades shear, and organs in a hole of which the instrument is do not count.
     pub fn axes_inside(&self) -> Vec<bool> {
-        self.arms.iter().map(|arm| arm.pierces(&self.world).is_some()).collect()
+        self.arms.iter().map(|arm| !arm.pierces(&self.world).is_empty()).collect()
+    }
+
+    /// The organs in a hole of which the instrument of arm `k` is, by their bodies, in the order in
+    /// which it went into them; none if the arm does not exist.
+    pub fn punctured_by(&self, k: usize) -> Vec<usize> {
+        let tool = self.arms.get(k).map(|arm| arm.model.tools.gripper);
+        let holes = self.world.state.holes.iter().filter(|hole| tool.is_some_and(|tool| hole.tools.contains(&tool)));
+        holes.map(|hole| hole.body).collect()
     }
 
     /// Wall time since the cell was built.

@@ -4,9 +4,11 @@ use crate::{Error, Result, Surroundings};
 use glam::DVec3;
 use trocar_core::Pose;
 use trocar_geometry::OrganAxis;
-use trocar_scene::{FIELD, PinEnd, PinRule, Scene, SupportKind, TOUGHNESS, ToolContactKind};
+use trocar_scene::{
+    BackendName, FIELD, LatticeLaw, PinEnd, PinRule, Scene, SupportKind, TOUGHNESS, Tissue, ToolContactKind,
+};
 use trocar_specimen::{End, Organ, Specimen};
-use trocar_tissue::{BodyContact, ToolContact};
+use trocar_tissue::{Backend, BodyContact, LatticeSettings, Law, ToolContact};
 
 /// A specimen in the cell frame, and the surroundings of its organs.
 #[derive(Clone, Debug)]
@@ -69,6 +71,7 @@ impl Placed {
         };
         let support = &scene.tissue.support;
         let surroundings = Surroundings {
+            backend: backend(&scene.tissue),
             body_contact: Some(contact),
             tool_contact: match scene.tissue.tool_contact {
                 ToolContactKind::Vertices => ToolContact::Vertices,
@@ -90,6 +93,23 @@ fn move_organ(organ: &mut Organ, pose: &Pose) {
     let points = organ.body.vertices.iter_mut().chain(&mut organ.surface.vertices).chain([&mut organ.base]);
     for p in points {
         *p = pose.transform(*p);
+    }
+}
+
+/// What bears the tissue of a scene.
+fn backend(tissue: &Tissue) -> Backend {
+    match tissue.backend {
+        BackendName::Tetrahedra => Backend::Tetrahedra,
+        BackendName::Lattice => {
+            let default = LatticeSettings::default();
+            Backend::Lattice(LatticeSettings {
+                cell: tissue.cell_mm.map_or(default.cell, |cell| 1e-3 * cell),
+                law: match tissue.law.unwrap_or_default() {
+                    LatticeLaw::Corotated => Law::Corotated,
+                    LatticeLaw::StableNeoHookean => Law::StableNeoHookean,
+                },
+            })
+        }
     }
 }
 

@@ -173,9 +173,32 @@ pub enum CellEvent {
         #[serde(skip_serializing_if = "Option::is_none")]
         parted: Option<Box<Severance>>,
     },
-    /// The instrument had pierced, overstretched or crushed tissue. It releases its grasp, and its
-    /// contact is disabled until it is out and the tissue has recovered.
-    ContactDisabled {
+    /// The instrument has punctured an organ: it came through the surface and had pressed on it with
+    /// at least the scene's `safety.puncture_force_n`. Around the hole it does not touch the organ
+    /// until it is out.
+    Punctured {
+        /// The arm.
+        arm: Side,
+        /// Name of the organ.
+        organ: String,
+        /// Organ coordinate of the hole.
+        s: f64,
+        /// Where the instrument's axis is inside the organ, in the cell (mm).
+        at_mm: [f64; 3],
+        /// The largest force with which it pressed on the organ in the last 0.1 s (N).
+        force_n: f64,
+    },
+    /// The axis of the instrument came into an organ that its jaws do not hold, with less force than
+    /// punctures it.
+    Pierced {
+        /// The arm.
+        arm: Side,
+        /// Name of the organ.
+        organ: String,
+    },
+    /// The instrument strained tissue beyond what tissue bears. It is reported once until the organ
+    /// has recovered.
+    Overstretched {
         /// The arm.
         arm: Side,
         /// Name of the organ.
@@ -185,26 +208,13 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest.
         volume: f64,
     },
-    /// Latched jaws had overstretched or crushed tissue. They keep their grasp, but contact of
-    /// their blades is disabled until they release it.
-    BladesDisabled {
-        /// The arm.
-        arm: Side,
+    /// An organ stays strained without an instrument at it.
+    Folded {
         /// Name of the organ.
         organ: String,
         /// Length of its most stretched edge over that at rest.
         stretch: f64,
         /// Least volume of an element over that at rest.
-        volume: f64,
-    },
-    /// An organ stayed folded without an instrument at it: it was relaxed without regard to time
-    /// and forces.
-    Relaxed {
-        /// Name of the organ.
-        organ: String,
-        /// Length of its most stretched edge over that at rest, before.
-        stretch: f64,
-        /// Least volume of an element over that at rest, before.
         volume: f64,
     },
     /// Tissue and solids pushed the instrument with more than the scene's limit; the instrument retracts.
@@ -252,25 +262,21 @@ impl std::fmt::Display for CellEvent {
                 let into = if *pieces == 1 { "without parting it".to_owned() } else { format!("into {pieces} pieces") };
                 write!(f, "the {} blades cut the {organ} with {work_mj:.1} mJ, {into}", arm.name())
             }
-            Self::ContactDisabled { arm, organ, stretch, volume } => write!(
-                f,
-                "contact of the {} instrument is disabled: it had pierced or strained the {organ} (stretch {stretch:.1}, smallest element {:.1}% of its volume)",
-                arm.name(),
-                1e2 * volume
-            ),
-            Self::BladesDisabled { arm, organ, stretch, volume } => write!(
-                f,
-                "contact of the {} blades is disabled: they hold the {organ} and had strained it (stretch {stretch:.1}, smallest element {:.1}% of its volume)",
-                arm.name(),
-                1e2 * volume
-            ),
-            Self::Relaxed { organ, stretch, volume } => {
-                let volume = 1e2 * volume;
-                write!(
-                    f,
-                    "the {organ}, stretched {stretch:.1} times and crushed to {volume:.1}%, was relaxed outside of time"
-                )
+            Self::Punctured { arm, organ, s, force_n, .. } => {
+                write!(f, "the {} instrument punctured the {organ} at s = {s:.2} with {force_n:.1} N", arm.name())
             }
+            Self::Pierced { arm, organ } => write!(f, "the {} instrument has pierced the {organ}", arm.name()),
+            Self::Overstretched { arm, organ, stretch, volume } => write!(
+                f,
+                "the {} instrument strains the {organ} beyond what tissue bears (stretch {stretch:.1}, smallest element {:.1}% of its volume)",
+                arm.name(),
+                1e2 * volume
+            ),
+            Self::Folded { organ, stretch, volume } => write!(
+                f,
+                "the {organ} stays strained with no instrument at it (stretch {stretch:.1}, smallest element {:.1}% of its volume)",
+                1e2 * volume
+            ),
             Self::InstrumentsTouch { depth_mm } => write!(f, "the instruments touch; they yield by {depth_mm:.2} mm"),
             Self::ForceLimit { arm, force_n } => {
                 write!(f, "the {} instrument is pushed with {force_n:.1} N, beyond the limit", arm.name())

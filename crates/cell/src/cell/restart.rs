@@ -14,7 +14,7 @@ impl Cell {
         space.clamp(&build::start(start, port, space))
     }
 
-    /// Restores the tissue of `state` without grasps, puts the arms at rest at `starts` (one for
+    /// Restores the tissue of `state` without grasps and holes, puts the arms at rest at `starts` (one for
     /// each arm), and sets the time to zero. The same state and starts give the same bits, whatever
     /// the cell did before.
     ///
@@ -27,6 +27,7 @@ impl Cell {
             return Err(Error::Option(format!("{given} starts; the cell has {here} arms")));
         }
         self.restore(state)?;
+        self.world.state.holes.clear();
         for (arm, start) in self.arms.iter_mut().zip(starts) {
             arm.drive.restart(start)?;
             let tool = arm.model.tools.gripper;

@@ -1,22 +1,18 @@
-//! How often each safety rule acted.
+//! How often the force guard acted, and what was beyond what tissue bears.
 
 use serde::Serialize;
 
-/// Counts of the actions of each rule.
+/// Counts of a control period. None of them stands for a change of physics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct RuleCounts {
     /// Commands that the force guard shortened.
     pub guarded: usize,
-    /// Instruments that had pierced an organ.
+    /// Instruments that punctured an organ.
+    pub punctures: usize,
+    /// Instruments whose axis came into an organ with less force than punctures it.
     pub pierced: usize,
-    /// Instruments that had overstretched or crushed tissue.
+    /// Organs that an instrument began to overstretch or crush.
     pub overstretched: usize,
-    /// Of both: contacts of whole instruments that were disabled.
-    pub disabled_contacts: usize,
-    /// Of both: contacts of blades alone that were disabled.
-    pub disabled_blades: usize,
-    /// Instruments whose contact was enabled again.
-    pub reconnected: usize,
-    /// Organs that were relaxed instantly.
-    pub relaxed: usize,
+    /// Organs that stayed strained without an instrument at them.
+    pub folded: usize,
 }

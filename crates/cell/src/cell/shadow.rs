@@ -1,6 +1,8 @@
-//! One cell repeats the tissue frames of another: for measuring the cost of contact.
+//! One cell repeats the tissue frames of another, or holds what the other holds: for measuring the
+//! cost of contact.
 
 use super::Cell;
+use crate::World;
 use std::time::{Duration, Instant};
 use trocar_tissue::{State, StepReport};
 
@@ -28,6 +30,25 @@ impl Cell {
         let clock = Instant::now();
         let report = self.world.step_under(&other.motions, &loads);
         (report, clock.elapsed())
+    }
+
+    /// Holds the tissue that `other` holds; to be called after each control period of `other`. What
+    /// it has grasped in that period is grasped here too, where it is here, and what it has released
+    /// is released. So a cell whose instruments touch nothing, and whose jaws therefore never close
+    /// on anything, lifts the same tissue. Both cells must have the same specimen, uncut.
+    ///
+    /// Friction alone ([`crate::GraspDesign::Friction`]) holds nothing without contact.
+    pub fn hold_as(&mut self, other: &Self) {
+        let World { model, state, .. } = &mut self.world;
+        let theirs = &other.world.state;
+        state.grasps.retain(|own| theirs.grasps.iter().any(|grasp| grasp.tool == own.tool && grasp.nodes == own.nodes));
+        for grasp in &theirs.grasps {
+            let arm = self.arms.iter().find(|arm| arm.model.tools.gripper == grasp.tool);
+            if let Some(arm) = arm.filter(|_| state.grasps.iter().all(|own| own.tool != grasp.tool)) {
+                let own = grasp.captured_in(model, theirs, state, &arm.state.gripper.pose);
+                state.grasps.push(own);
+            }
+        }
     }
 
     /// Largest distance between a node of this cell and the same one of another (m).

@@ -7,7 +7,7 @@ use super::Cell;
 use super::arm::ArmState;
 use super::delay::Waiting;
 use super::drive::DriveState;
-use super::rules::Edges;
+use super::rules::{Edges, OrganWatch};
 use super::solid::PinnedSurface;
 use crate::Result;
 use crate::world::WorldState;
@@ -19,7 +19,7 @@ use xxhash_rust::xxh3::Xxh3;
 pub struct CellState {
     world: WorldState,
     arms: Vec<(ArmState, DriveState)>,
-    waits: Vec<u32>,
+    watches: Vec<OrganWatch>,
     touch: bool,
     waiting: Waiting,
     periods: u64,
@@ -28,11 +28,11 @@ pub struct CellState {
 impl CellState {
     /// Hash over every bit on which later steps depend.
     pub fn hash(&self) -> u64 {
-        let Self { world, arms, waits, touch, waiting, periods } = self;
+        let Self { world, arms, watches, touch, waiting, periods } = self;
         let mut hash = Xxh3::new();
         hash.update(&periods.to_le_bytes());
         hash.update(&world.hash().to_le_bytes());
-        waits.iter().for_each(|w| hash.update(&w.to_le_bytes()));
+        watches.iter().for_each(|watch| hash.update(&watch.bytes()));
         hash.update(&[u8::from(*touch)]);
         for (arm, drive) in arms {
             for number in drive.numbers().into_iter().chain(arm.numbers()) {
@@ -53,7 +53,7 @@ impl Cell {
             world,
             arms,
             periods,
-            waits,
+            watches,
             touch,
             waiting,
             control_hz: _,
@@ -65,13 +65,13 @@ impl Cell {
             edges: _,
             solids: _,
             contact: _,
-            rules: _,
+            strain_guard: _,
             timing: _,
         } = self;
         CellState {
             world: world.save(),
             arms: arms.iter().map(|arm| (arm.state.clone(), arm.drive.state())).collect(),
-            waits: waits.clone(),
+            watches: watches.clone(),
             touch: *touch,
             waiting: waiting.clone(),
             periods: *periods,
@@ -84,7 +84,7 @@ impl Cell {
     /// # Errors
     /// A state of a cell with other arms or organs.
     pub fn restore(&mut self, state: &CellState) -> Result<()> {
-        let CellState { world, arms, waits, touch, waiting, periods } = state;
+        let CellState { world, arms, watches, touch, waiting, periods } = state;
         if arms.len() != self.arms.len() {
             let (given, here) = (arms.len(), self.arms.len());
             return Err(crate::Error::Option(format!("the state has {given} arms, the cell {here}")));
@@ -100,7 +100,7 @@ impl Cell {
             arm.drive.restore(drive)?;
             arm.state.clone_from(state);
         }
-        self.waits.clone_from(waits);
+        self.watches.clone_from(watches);
         self.touch = *touch;
         self.waiting.clone_from(waiting);
         self.periods = *periods;

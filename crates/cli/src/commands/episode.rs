@@ -88,8 +88,8 @@ fn text(made: &EpisodeOutput) -> String {
     for said in [&s.why, &s.advice].into_iter().flatten() {
         remarks += &format!("\n{said}");
     }
-    if let Some(said) = s.suspensions() {
-        remarks += &format!("\nsuspensions of physics: {said}");
+    if let Some(said) = s.warnings.described() {
+        remarks += &format!("\nbeyond what tissue bears: {said}");
     }
     let grasp = match (s.grasp_at, s.lift_mm, s.slip_mm) {
         (Some(at), Some(lift), Some(slip)) => {

@@ -63,7 +63,7 @@ fn text(r: &CampaignResult, curves: &str) -> String {
             ("max (mm)", &|p| or_dash(p.rcm_max_mm, 3)),
             ("diverged", &|p| p.ends.diverged.to_string()),
             ("failed", &|p| p.ends.policy_error.to_string()),
-            ("suspended", &|p| p.suspensions()),
+            ("warnings", &|p| p.warnings.to_string()),
         ],
     );
     let stages = r

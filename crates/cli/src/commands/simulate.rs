@@ -92,8 +92,8 @@ pub fn text(r: &LiftResult) -> String {
     for arm in s.arms.iter().filter(|a| a.rcm_peak_mm > 0.0) {
         text += &format!("\n{}: {}", arm.arm, rcm(arm));
     }
-    if let Some(said) = s.suspensions() {
-        text += &format!("\nsuspensions of physics: {said}");
+    if let Some(said) = s.warnings.described() {
+        text += &format!("\nbeyond what tissue bears: {said}");
     }
     for said in [&s.why, &s.advice].into_iter().flatten() {
         text += &format!("\n{said}");

@@ -1,6 +1,7 @@
 //! Elements against finite differences, affine fields and rotations.
 
 use super::*;
+use crate::flow::Flow;
 use crate::material::Law;
 use glam::DQuat;
 
@@ -53,6 +54,18 @@ fn elements(check: impl Fn(Element<'_>, [DVec3; 8], &str)) {
     }
 }
 
+/// d' H d.
+fn along(blocks: &Blocks, d: &[DVec3; 8]) -> f64 {
+    let mut sum = 0.0;
+    for a in 0..8 {
+        for b in 0..=a {
+            let twice = if a == b { 1.0 } else { 2.0 };
+            sum += twice * d[a].dot(blocks[a * (a + 1) / 2 + b] * d[b]);
+        }
+    }
+    sum
+}
+
 #[test]
 fn gradient_and_hessian_are_derivatives() {
     elements(|element, x, name| {
@@ -86,16 +99,6 @@ fn gradient_and_hessian_are_derivatives() {
 /// The projected stiffness has no negative curvature, and is exact where the exact one has none.
 #[test]
 fn the_projected_hessian_is_positive() {
-    let along = |blocks: &Blocks, d: &[DVec3; 8]| {
-        let mut sum = 0.0;
-        for a in 0..8 {
-            for b in 0..=a {
-                let twice = if a == b { 1.0 } else { 2.0 };
-                sum += twice * d[a].dot(blocks[a * (a + 1) / 2 + b] * d[b]);
-            }
-        }
-        sum
-    };
     let mut indefinite = 0;
     elements(|element, x, name| {
         let exact = element.evaluate(&x, Wanted::Exact).hessian.unwrap();
@@ -146,5 +149,47 @@ fn rotations_change_neither_energy_nor_forces() {
         for (a, b) in here.gradient.iter().zip(&there.gradient) {
             assert!((turn * *a - *b).length() < 1e-11 * scale / CELL, "{name}");
         }
+    });
+}
+
+/// The forces without singular values are those with them, also where tissue is inverted.
+#[test]
+fn both_ways_to_the_forces_agree() {
+    elements(|element, x, name| {
+        let (energy, gradient) = element.forces(&x, None);
+        let with = element.evaluate(&x, Wanted::Gradient);
+        let scale = element.material.bulk_modulus() * CELL.powi(3);
+        assert!((energy - with.energy).abs() < 1e-12 * scale, "{name}: {energy} {}", with.energy);
+        for (a, b) in gradient.iter().zip(&with.gradient) {
+            assert!((*a - *b).length() < 1e-11 * scale / CELL, "{name}: {a} {b}");
+        }
+    });
+}
+
+/// Viscous forces are the gradient of their potential, vanish in a rotation, and their stiffness is
+/// the second derivative where nothing is strained.
+#[test]
+fn viscous_forces_have_a_potential() {
+    elements(|element, x, name| {
+        let flow = Flow { stiffness: 700.0, before: vec![element.green(&x)] };
+        let viscous = |x: &[DVec3; 8]| {
+            let ((with, a), (without, b)) =
+                (element.forces(x, Some((&flow, &flow.before[0]))), element.forces(x, None));
+            (with - without, std::array::from_fn::<DVec3, 8, _>(|c| a[c] - b[c]))
+        };
+        let scale = flow.stiffness * CELL * CELL;
+        let turn = DMat3::from_rotation_z(0.8);
+        let turned = viscous(&x.map(|p| turn * p));
+        assert!(turned.1.iter().all(|force| force.length() < 1e-9 * scale), "{name}");
+        let way: [DVec3; 8] = std::array::from_fn(|c| 1e-3 * DVec3::new((c as f64).sin(), (c as f64).cos(), 0.3));
+        let at = |share: f64| std::array::from_fn(|c| x[c] + share * way[c]);
+        let (more, less) = (viscous(&at(1.0 + 1e-4)).0, viscous(&at(1.0 - 1e-4)).0);
+        let slope: f64 = viscous(&at(1.0)).1.iter().zip(&way).map(|(g, d)| g.dot(*d)).sum();
+        assert!(((more - less) / 2e-4 / slope - 1.0).abs() < 1e-5, "{name}: {slope}");
+        let mut blocks = [DMat3::ZERO; 36];
+        element.add_viscous(&x, &flow, &mut blocks);
+        let curvature = along(&blocks, &way);
+        let change: f64 = viscous(&at(1e-4)).1.iter().zip(&way).map(|(g, d)| g.dot(*d)).sum();
+        assert!((change / 1e-4 / curvature - 1.0).abs() < 1e-3, "{name}: {change} {curvature}");
     });
 }

@@ -13,7 +13,7 @@
 mod corotated;
 mod stable_neo_hookean;
 
-use crate::symmetric::eigen;
+use crate::symmetric::{cofactor, eigen, nearest_rotation};
 use glam::{DMat3, DVec3};
 
 /// Constitutive law.
@@ -73,6 +73,35 @@ impl Material {
             }
         }
         Ok(())
+    }
+
+    /// Energy density and stress dPsi/dF (Pa) of a part at F, without singular values.
+    pub(crate) fn stress(&self, part: Part, f: DMat3) -> (f64, DMat3) {
+        let (mu, bulk) = (self.shear_modulus(), self.bulk_modulus());
+        match self.law {
+            Law::Corotated => {
+                let turn = nearest_rotation(f);
+                let off = f - turn;
+                let trace: f64 = (0..3).map(|c| turn.col(c).dot(off.col(c))).sum();
+                if part == Part::Deviatoric {
+                    let squares: f64 = off.to_cols_array().iter().map(|e| e * e).sum();
+                    (mu * (squares - trace * trace / 3.0), (off - turn * (trace / 3.0)) * (2.0 * mu))
+                } else {
+                    (0.5 * bulk * trace * trace, turn * (bulk * trace))
+                }
+            }
+            Law::StableNeoHookean => {
+                let areas = cofactor(f);
+                let change = f.x_axis.dot(areas.x_axis) - 1.0;
+                if part == Part::Deviatoric {
+                    let squares: f64 = f.to_cols_array().iter().map(|e| e * e).sum();
+                    let energy = mu * (0.5 * (squares - 3.0) - change + change * change / 6.0);
+                    (energy, f * mu + areas * (mu * (change / 3.0 - 1.0)))
+                } else {
+                    (0.5 * bulk * change * change, areas * (bulk * change))
+                }
+            }
+        }
     }
 
     /// The energy density of a part at the singular values `s` of F, with its derivatives.

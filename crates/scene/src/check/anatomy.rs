@@ -1,7 +1,9 @@
 //! Checks of the specimen, the settings of its organs, and their tissue.
 
 use super::{Checked, Problem, join, name, number, numbers, one_of, point, problem, quaternion};
-use crate::{FIELD, MaterialOverride, PHANTOMS, PinEnd, PinRule, Scene, Source, SpecimenSource};
+use crate::{
+    BackendName, FIELD, MaterialOverride, PHANTOMS, PinEnd, PinRule, Scene, ScheduleName, Source, SpecimenSource,
+};
 use trocar_specimen::{End, Material};
 
 pub(super) fn check(scene: &Scene) -> Checked {
@@ -29,7 +31,32 @@ pub(super) fn check(scene: &Scene) -> Checked {
             ("tear_force_n", t.tear_force_n, 0.1..=100.0),
             ("support.friction", t.support.friction, 0.0..=5.0),
         ],
-    )
+    )?;
+    backend(scene)
+}
+
+/// What bears the tissue, and what it cannot do.
+fn backend(scene: &Scene) -> Checked {
+    let t = &scene.tissue;
+    if let Some(cell) = t.cell_mm {
+        number("tissue.cell_mm", cell, &(1.0..=20.0))?;
+    }
+    match t.backend {
+        BackendName::Tetrahedra => {
+            for (key, given) in [("cell_mm", t.cell_mm.is_some()), ("law", t.law.is_some())] {
+                if given {
+                    let reason = " is for tissue.backend = 'lattice'; remove it, or set the backend";
+                    return Err(problem(format!("tissue.{key}"), reason.into()));
+                }
+            }
+        }
+        BackendName::Lattice if t.schedule != ScheduleName::Fast => {
+            let reason = " is for tetrahedra; a lattice has one schedule: remove it";
+            return Err(problem("tissue.schedule", reason.into()));
+        }
+        BackendName::Lattice => {}
+    }
+    Ok(())
 }
 
 fn specimen(scene: &Scene) -> Checked {

@@ -27,6 +27,7 @@ pub(super) fn check(scene: &Scene) -> Checked {
             ("rcm_threshold_mm", safety.rcm_threshold_mm, 0.01..=50.0),
             ("rcm_abort_mm", safety.rcm_abort_mm, 0.01..=50.0),
             ("force_limit_n", safety.force_limit_n, 0.1..=1000.0),
+            ("puncture_force_n", safety.puncture_force_n, 0.1..=1000.0),
         ],
     )?;
     let ordered = [

@@ -39,7 +39,7 @@ impl Needs {
     }
 }
 
-const ARM: [(&str, Kind); 41] = [
+const ARM: [(&str, Kind); 40] = [
     ("pivot_1_rad", In(Unit::Radian)),
     ("pivot_2_rad", In(Unit::Radian)),
     ("insertion_m", In(Unit::Metre)),
@@ -77,13 +77,12 @@ const ARM: [(&str, Kind); 41] = [
     ("rejected_deg", In(Unit::Degree)),
     ("held_back", Flag),
     ("load_limited", Flag),
-    ("contact_disabled", Flag),
-    ("blades_disabled", Flag),
+    ("pierces", Flag),
     ("guarded", Flag),
     ("solid_n", In(Unit::Newton)),
 ];
 
-const TASK: [(&str, Kind, Needs); 27] = [
+const TASK: [(&str, Kind, Needs); 28] = [
     ("grasp_distance_mm", In(Unit::Millimetre), Needs::GRASPER),
     ("grasped", Flag, Needs::GRASPER),
     ("grasp_s", In(Unit::None), Needs::GRASPER),
@@ -107,9 +106,10 @@ const TASK: [(&str, Kind, Needs); 27] = [
     ("yielded", In(Unit::None), Needs::NOTHING),
     ("fallbacks", In(Unit::None), Needs::NOTHING),
     ("diverged", Flag, Needs::NOTHING),
-    ("disabled_contacts", In(Unit::None), Needs::NOTHING),
-    ("disabled_blades", In(Unit::None), Needs::NOTHING),
-    ("relaxed", In(Unit::None), Needs::NOTHING),
+    ("punctures", In(Unit::None), Needs::NOTHING),
+    ("pierced", In(Unit::None), Needs::NOTHING),
+    ("overstretched", In(Unit::None), Needs::NOTHING),
+    ("folded", In(Unit::None), Needs::NOTHING),
     ("activation_step_mm", In(Unit::Millimetre), Needs::NOTHING),
 ];
 

@@ -195,11 +195,6 @@ pub(super) fn peak_constraint(recording: &Recording) -> f64 {
     recording.summary.arms.iter().map(|a| a.peak_constraint_n).fold(0.0, f64::max)
 }
 
-/// Disabled contacts, disabled contacts of blades, and relaxed organs, as text.
-pub(super) fn suspensions(counts: [usize; 3]) -> String {
-    if counts == [0; 3] { "0".to_owned() } else { counts.map(|n| n.to_string()).join("/") }
-}
-
 /// The last column of a table of lifts: why the lift failed, slips and tears, `other`.
 pub(super) fn remarks(
     divergence: Option<&String>,

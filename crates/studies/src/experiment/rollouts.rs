@@ -13,6 +13,7 @@ use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::table::{count, fixed, or_dash};
 use trocar_scene::{Split, VariationSet};
+use trocar_task::Warnings;
 use trocar_task::policy::POLICIES;
 
 /// The page of the study, beside the page of the campaign.
@@ -102,8 +103,10 @@ pub struct RolloutsResult {
     pub rcm_within_5_mm: usize,
     /// Largest number of inverted elements in any frame.
     pub inverted_peak: usize,
-    /// Suspensions in all rollouts: contacts disabled, contacts of blades disabled, organs relaxed.
-    pub suspensions: [usize; 3],
+    /// What was beyond what tissue bears, in all rollouts.
+    pub warnings: Warnings,
+    /// How often a rule switched physics off: never, since none does.
+    pub suspensions: usize,
     /// Rows of the controllers.
     pub by_policy: Vec<PolicyRow>,
     /// The paper's figures.
@@ -169,11 +172,8 @@ impl RolloutsResult {
             rcm_within_3_mm: within(THRESHOLD_MM),
             rcm_within_5_mm: within(ABORT_MM),
             inverted_peak: records.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),
-            suspensions: [
-                records.iter().map(|k| k.summary.disabled_contacts).sum(),
-                records.iter().map(|k| k.summary.disabled_blades).sum(),
-                records.iter().map(|k| k.summary.relaxed).sum(),
-            ],
+            warnings: made.warnings,
+            suspensions: made.suspensions,
             by_policy: made.policies,
             paper: PAPER,
             hash: made.hash,
@@ -198,12 +198,7 @@ fn document(manifest: &Manifest, r: &RolloutsResult, records: &[EpisodeRecord]) 
         Card::new("Diverged", count(r.diverged), "of all rollouts").met(r.diverged == 0),
         Card::new("Inverted elements", count(r.inverted_peak), "largest number in any frame").met(r.inverted_peak == 0),
         Card::new("Passed", format!("{} of {}", r.passed, r.rollouts), "all stages"),
-        Card::new(
-            "Suspensions",
-            r.suspensions.map(|n| n.to_string()).join("/"),
-            "contacts disabled / contacts of blades disabled / organs relaxed",
-        )
-        .met(r.suspensions == [0; 3]),
+        Card::new("Warnings", r.warnings.to_string(), Warnings::LEGEND).met(r.warnings.is_empty()),
     ];
     let outcome = Section::new("Outcome", lead).cards(cards).table(beside_paper(r));
     let spread = Section::new("Lift and RCM deviation", "All rollouts that attached the organ.")

@@ -344,7 +344,7 @@ impl Scripted {
             Phase::Enter => Phase::Close,
             Phase::Close if t.grasped == 0.0 && again => {
                 self.tries += 1;
-                self.grip.missed(self.is_disabled(episode));
+                self.grip.missed(self.has_pierced(episode));
                 Phase::Approach
             }
             Phase::Close if drags => Phase::Drag,
@@ -411,11 +411,11 @@ impl Scripted {
         t.grasped > 0.0 && wanted && t.lift_mm >= least && self.lift < 1e-3 * gate + MOST_ABOVE
     }
 
-    /// Whether tissue does not feel the grasper.
-    fn is_disabled(&self, episode: &Episode) -> bool {
+    /// Whether the grasper has pierced an organ.
+    fn has_pierced(&self, episode: &Episode) -> bool {
         let arms = episode.cell().arms();
         let grasper = episode.roles().0.and_then(|k| arms.get(k));
-        grasper.is_some_and(|(side, _)| episode.cell().disabled_contact(side.name()).is_ok_and(|(all, _)| all))
+        grasper.is_some_and(|(side, _)| episode.cell().pierces(side.name()).unwrap_or(false))
     }
 
     fn action(&mut self, episode: &Episode) -> Result<Action> {

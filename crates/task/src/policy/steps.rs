@@ -167,9 +167,9 @@ impl Steps {
             Some(Phase::Enter) => self.enter(episode, Phase::Close),
             Some(Phase::Close) if !holds(episode, step)? && self.tries[k] < TRIES => {
                 self.tries[k] += 1;
-                let disabled = episode.cell().disabled_contact(step.arm.name())?.0;
-                self.grips[k].missed(disabled);
-                if disabled {
+                let pierced = episode.cell().pierces(step.arm.name())?;
+                self.grips[k].missed(pierced);
+                if pierced {
                     // There is no room for the blades beside the tissue.
                     self.manners[k] = Manner::Pinching;
                 }

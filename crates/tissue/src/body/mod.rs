@@ -13,7 +13,8 @@ pub(crate) mod surface;
 pub(crate) mod tree;
 mod vertex;
 
-use crate::{Material, Support};
+use crate::lattice::Embedding;
+use crate::{LatticeSettings, Material, Support};
 use element_lanes::ElementLanes;
 use glam::{DVec3, Vec3A};
 use groups::Groups;
@@ -69,6 +70,8 @@ pub struct BodyData {
     pub(crate) elements: Option<ElementLanes>,
     /// Rest volume of each element (m3), in the order of `tets`.
     pub(crate) volumes: Vec<f64>,
+    /// Its lattice; None if its tetrahedra bear it, or if it is pinned as a whole.
+    pub(crate) lattice: Option<Embedding>,
 }
 
 impl Deref for Body {
@@ -106,7 +109,13 @@ impl Body {
                 && self.material == other.material
                 && self.pinned == other.pinned
                 && self.supports == other.supports
-                && self.contact_stiffness == other.contact_stiffness)
+                && self.contact_stiffness == other.contact_stiffness
+                && self.lattice_settings() == other.lattice_settings())
+    }
+
+    /// How its lattice was made; None without one.
+    fn lattice_settings(&self) -> Option<LatticeSettings> {
+        self.lattice.as_ref().map(|lattice| lattice.settings)
     }
 
     /// Name.

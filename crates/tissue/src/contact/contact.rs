@@ -75,6 +75,11 @@ impl Contact {
         depth.max(0.0) + (HARDENING - 1.0) * (depth - self.hard_from).max(0.0)
     }
 
+    /// Stiffness beyond the depth from which the spring is harder (N/m).
+    pub fn hardened(&self) -> f32 {
+        HARDENING * self.stiffness
+    }
+
     /// Stiffness along the normal of a point at `x` (N/m).
     #[inline(always)]
     pub fn tangent(&self, x: Vec3A) -> f32 {

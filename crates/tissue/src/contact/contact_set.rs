@@ -8,6 +8,7 @@ use super::compliant_grasp::{self, CompliantNode};
 use super::contact::{Contact, Friction};
 use super::feature_contacts::FeatureContacts;
 use super::force::ToolForce;
+use super::hole_vertices::HoleVertices;
 use super::memory::{Anchor, Source};
 use super::site::Site;
 use super::tool_contact::ToolContact;
@@ -58,6 +59,7 @@ pub(crate) struct ContactSet {
     touching: Vec<bool>,
     /// Vertices that no contact moves: pinned or held rigidly.
     fixed: Vec<bool>,
+    holes: HoleVertices,
     /// Distance from which a vertex may touch a surface in this frame (m).
     reach: f32,
     /// Forces on each tool at the end of the last substep.
@@ -84,6 +86,7 @@ impl ContactSet {
             outer: outer(&surface, body.len()),
             touching: vec![false; body.len()],
             fixed: vec![false; body.len()],
+            holes: HoleVertices::default(),
             reach: 0.0,
             forces: Vec::new(),
             surface,
@@ -99,6 +102,7 @@ impl ContactSet {
         self.forces.clear();
         self.forces.resize(frame.tools.len(), ToolForce::default());
         self.mark_fixed(frame, body);
+        self.holes.begin_frame(frame, body);
         compliant_grasp::find(frame, body, &self.fixed, &mut self.compliant);
         tool_placement::place(frame, body, 0.0, 1.0, &mut self.placed);
         // Room for all contacts that a substep may have, so that only the first one allocates.
@@ -111,7 +115,7 @@ impl ContactSet {
         state.anchors.reserve(anchors.saturating_sub(state.anchors.len()));
         self.find_near(frame, body, state);
         if frame.tool_contact == ToolContact::Surface {
-            self.features.begin_frame(frame, body, state, &self.placed, self.reach);
+            self.features.begin_frame(frame, body, state, &self.placed, &self.holes, self.reach);
         }
     }
 
@@ -147,7 +151,7 @@ impl ContactSet {
             let (mut near, mut touches) = (hangs, false);
             if !self.fixed[i] {
                 let (x, ahead) = (state.x[i], state.x[i] + dt * state.v[i] + drop);
-                self.for_sources(frame, body, x, |_, height, normal, point, _, _| {
+                self.for_sources(frame, body, i, x, |_, height, normal, point, _, _| {
                     near = true;
                     touches |= height < 0.0 || (ahead - point).dot(normal) < 0.0;
                 });
@@ -174,7 +178,7 @@ impl ContactSet {
         }
     }
 
-    /// Calls `found` for everything within reach of a vertex at `x`: what it is; the height above
+    /// Calls `found` for everything within reach of a `vertex` at `x`: what it is; the height above
     /// it now; normal and point of the plane at the substep's end; the vertex in the frame of what
     /// it touches; and a factor of its contact stiffness, because a field's penalty is along its
     /// `up`.
@@ -183,6 +187,7 @@ impl ContactSet {
         &self,
         frame: &Frame<'_>,
         body: &Body,
+        vertex: usize,
         x: Vec3A,
         mut found: impl FnMut(Source, f32, Vec3A, Vec3A, Vec3A, f32),
     ) {
@@ -198,7 +203,9 @@ impl ContactSet {
         for (c, (collider, placed)) in frame.colliders.iter().zip(&self.placed).enumerate() {
             let Some(placed) = placed else { continue };
             let far = self.reach + placed.reach;
-            if (x - placed.centre).length_squared() > (placed.radius + far) * (placed.radius + far) {
+            if (x - placed.centre).length_squared() > (placed.radius + far) * (placed.radius + far)
+                || self.holes.lets_through(collider.tool, vertex)
+            {
                 continue;
             }
             let p = placed.from.transform(body.origin + x.as_dvec3());
@@ -236,7 +243,7 @@ impl ContactSet {
             let held = hanging.next_if(|h| h.vertex == *vertex);
             if self.outer[i] && !self.fixed[i] {
                 let stiffness = body.vertices[i].contact_stiffness;
-                self.for_sources(frame, body, x(i), |source, _, normal, point, now, factor| {
+                self.for_sources(frame, body, i, x(i), |source, _, normal, point, now, factor| {
                     while self.anchors.get(anchor).is_some_and(|a| (a.vertex, a.source) < (*vertex, source)) {
                         anchor += 1;
                     }
@@ -318,6 +325,7 @@ impl ContactSet {
             gravity: glam::DVec3::ZERO,
             index: 0,
             grasps: &[],
+            holes: &[],
             tools: &[],
             loads: &[],
             colliders: &[],

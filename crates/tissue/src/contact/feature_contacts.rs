@@ -14,6 +14,7 @@
 
 use super::contact::{Contact, Friction};
 use super::force::ToolForce;
+use super::hole_vertices::HoleVertices;
 use super::memory::{FeatureAnchor, Source};
 use super::shape::Shape;
 use super::site::Site;
@@ -54,13 +55,14 @@ pub(super) struct FeatureContacts {
 
 impl FeatureContacts {
     /// Begins a frame: finds the triangles that the `placed` colliders may meet in it. A vertex at
-    /// most `reach` from a surface may touch it (m).
+    /// most `reach` from a surface may touch it (m). Triangles in `holes` let the tools through.
     pub fn begin_frame(
         &mut self,
         frame: &Frame<'_>,
         body: &Body,
         state: &BodyState,
         placed: &[Option<Placed>],
+        holes: &HoleVertices,
         reach: f32,
     ) {
         self.anchors.clone_from(&state.feature_anchors);
@@ -86,6 +88,9 @@ impl FeatureContacts {
                     let first = chunk * CHUNK;
                     let all = first as u32..(first + CHUNK).min(triangles.len()) as u32;
                     self.near.extend(all.filter(|t| {
+                        if triangles[*t as usize].iter().any(|i| holes.lets_through(collider.tool, *i as usize)) {
+                            return false;
+                        }
                         let [p, q, r] = corners(*t);
                         may_meet((p, (q - p).length_squared().max((r - p).length_squared()).sqrt()))
                     }));

@@ -85,6 +85,11 @@ impl Pair {
         x(self.member, self.vertex) + self.shift - (place(0) + place(1) + place(2))
     }
 
+    /// From the frame of the triangle's body to that of the vertex's (m).
+    pub fn shift(&self) -> Vec3A {
+        self.shift
+    }
+
     /// The four vertices with their bodies, and the share of the force on each.
     pub fn shares(&self) -> [(usize, u32, f32); 4] {
         let corner = |k: usize| (self.other, self.corners[k], -self.weights[k]);

@@ -62,6 +62,14 @@ impl Reaction {
         }
     }
 
+    /// Takes the forces over from a solver that knows them. No force of another body is added to
+    /// them.
+    pub fn set(&mut self, forces: &[ToolForce]) {
+        self.carrier.fill(None);
+        self.forces.clear();
+        self.forces.extend_from_slice(forces);
+    }
+
     /// Adds the force of another body on a vertex (N), if a tool carries it.
     pub fn press(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState, vertex: usize, force: DVec3) {
         if let Some(tool) = self.carrier[vertex] {

@@ -4,8 +4,9 @@ use super::split::{Split, parts};
 use super::{Piece, Severed};
 use crate::builder::{Inherited, lay_out};
 use crate::contact::Anchor;
+use crate::lattice::Embedding;
 use crate::state::{BodyState, WarmStart};
-use crate::{Body, BodyDescription, Compliance, Grasp, MassFloor, Model, State};
+use crate::{Backend, Body, BodyDescription, Compliance, Grasp, Hole, MassFloor, Model, Result, State};
 use trocar_geometry::TetMesh;
 
 /// A mass this many times the weight of the volume around a node was raised to the floor; less is
@@ -13,7 +14,10 @@ use trocar_geometry::TetMesh;
 const RAISED_MASS_RATIO: f64 = 1.0 + 1e-5;
 
 /// The model and state with the body at `index` as it was `split`.
-pub(super) fn carry(model: &Model, state: &State, index: usize, split: &Split) -> Severed {
+///
+/// # Errors
+/// A piece without a lattice, if the whole has one.
+pub(super) fn carry(model: &Model, state: &State, index: usize, split: &Split) -> Result<Severed> {
     let whole = &model.bodies[index];
     let (group, groups) = bodies(whole, split);
     // Place of each new node in its body.
@@ -45,8 +49,16 @@ pub(super) fn carry(model: &Model, state: &State, index: usize, split: &Split) -
         let pinned = (0..nodes.len() as u32).filter(|k| whole.pinned[nodes[*k as usize] as usize]).collect();
         let (material, supports) = (whole.material, whole.supports.clone());
         let description = BodyDescription { name, mesh: &mesh, material, pinned, supports };
-        let body = lay_out(description, MassFloor::None, whole.contact_stiffness, Some(inherited));
-        let motion = motion(whole, &state.bodies[index], &body, &nodes);
+        let mut body = lay_out(description, MassFloor::None, whole.contact_stiffness, Some(inherited));
+        if let Backend::Lattice(settings) = model.backend {
+            body.lattice = Embedding::of(&body, settings)?;
+        }
+        let mut motion = motion(whole, &state.bodies[index], &body, &nodes);
+        if let (Some(lattice), Some(before), Some(state)) =
+            (&body.lattice, &whole.lattice, &state.bodies[index].lattice)
+        {
+            motion.lattice = Some(lattice.of_piece(before, state, &elements));
+        }
         let at = if g == 0 { index } else { after.bodies.len() };
         if g == 0 {
             after.bodies[at] = body;
@@ -67,7 +79,15 @@ pub(super) fn carry(model: &Model, state: &State, index: usize, split: &Split) -
             moved.grasps.push(grasp.clone());
         }
     }
-    Severed { model: after, state: moved, faces: split.faces, pieces }
+    moved.holes.clear();
+    for hole in &state.holes {
+        if hole.body == index {
+            hands.follow(hole, &mut moved.holes);
+        } else {
+            moved.holes.push(hole.clone());
+        }
+    }
+    Ok(Severed { model: after, state: moved, faces: split.faces, pieces })
 }
 
 /// The body of each new node, 0 being the one that stays, and the number of bodies. Of each
@@ -149,6 +169,7 @@ fn motion(whole: &Body, state: &BodyState, piece: &Body, nodes: &[u32]) -> BodyS
             falling: from.iter().map(|i| state.warm.falling[*i]).collect(),
             supported: from.iter().map(|i| state.warm.supported[*i]).collect(),
         },
+        lattice: piece.lattice.as_ref().map(|lattice| lattice.at_rest()),
     }
 }
 
@@ -187,7 +208,7 @@ fn filter(filtered: &mut Vec<[usize; 2]>, whole: usize, pieces: std::ops::Range<
     filtered.sort_unstable();
 }
 
-/// Distributes grasps among the pieces.
+/// Distributes grasps and holes among the pieces.
 struct Hands<'a> {
     split: &'a Split,
     /// By new node: the number of its piece and its node there.
@@ -197,6 +218,18 @@ struct Hands<'a> {
 }
 
 impl Hands<'_> {
+    /// Appends a hole for each piece that has nodes of `hole`.
+    fn follow(&self, hole: &Hole, to: &mut Vec<Hole>) {
+        let mut nodes: Vec<Vec<u32>> = vec![Vec::new(); self.pieces.len()];
+        for i in hole.nodes.iter().flat_map(|node| self.split.copies(*node)) {
+            nodes[self.group[i as usize]].push(self.place[i as usize]);
+        }
+        for (piece, mut nodes) in self.pieces.iter().zip(nodes).filter(|(_, nodes)| !nodes.is_empty()) {
+            nodes.sort_unstable();
+            to.push(Hole { body: piece.body, tools: hole.tools.clone(), nodes });
+        }
+    }
+
     /// Appends a grasp for each piece of which `grasp` holds nodes.
     fn share_out(&self, grasp: &Grasp, to: &mut Vec<Grasp>) {
         let mut off_the_cut = vec![false; self.split.before];

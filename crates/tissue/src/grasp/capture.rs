@@ -23,6 +23,15 @@ impl Grasp {
         Self::new(tool, body, nodes, captured, pose)
     }
 
+    /// The grasp as it would have been captured in `here`, with the tool at `pose`, instead of in
+    /// `there`, both states of `model`: each node is held as far from where it is here as there.
+    pub fn captured_in(&self, model: &Model, there: &State, here: &State, pose: &Pose) -> Self {
+        let at = |state: &State, node: u32| state.position(model, self.body, node as usize);
+        let held = self.nodes.iter().zip(&self.captured);
+        let captured = held.map(|(i, x)| *x + (at(here, *i) - at(there, *i))).collect();
+        Self { compliance: self.compliance, ..Self::new(self.tool, self.body, self.nodes.clone(), captured, pose) }
+    }
+
     fn new(tool: usize, body: usize, nodes: Vec<u32>, captured: Vec<DVec3>, pose: &Pose) -> Self {
         let slid = vec![Vec3A::ZERO; nodes.len()];
         Self { tool, body, nodes, captured, captured_at: *pose, compliance: None, slid, slips: false, torn: false }

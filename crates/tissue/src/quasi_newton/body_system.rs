@@ -38,6 +38,8 @@ pub(crate) struct QuasiNewtonSolver {
     pub(super) loads: Loads,
     /// Free nodes that a tool carries.
     pub(super) held: Vec<bool>,
+    /// The same in the frame before.
+    held_before: Vec<bool>,
     /// The body's part of the island's last steps.
     pub(super) memory: Memory,
     /// Rigid motions, of a body that touches others and that nothing holds.
@@ -103,6 +105,7 @@ impl QuasiNewtonSolver {
             touching: Touching { contacts: ContactSet::new(body), limits, pressed: false },
             loads: Loads { forces: vec![[0.0; 4]; layout.rows], any: false },
             held: vec![false; layout.free],
+            held_before: vec![false; layout.free],
             memory: Memory::new(settings.memory, layout.rows),
             rigid: None,
             progress: Progress {
@@ -124,8 +127,9 @@ impl QuasiNewtonSolver {
     /// Begins a frame.
     pub fn begin_frame(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
         self.iterate.load(&self.layout, state);
-        self.mark_held(frame, body);
-        self.rest.has_gradient = false;
+        if self.mark_held(frame, body) {
+            self.rest.has_gradient = false;
+        }
         if std::mem::take(&mut self.loads.any) {
             self.loads.forces.fill([0.0; 4]);
         }
@@ -140,8 +144,9 @@ impl QuasiNewtonSolver {
         self.refresh_system(frame, body, state);
     }
 
-    /// Marks the nodes that tools carry.
-    fn mark_held(&mut self, frame: &Frame<'_>, body: &Body) {
+    /// Marks the nodes that tools carry. Returns whether they are others than before.
+    fn mark_held(&mut self, frame: &Frame<'_>, body: &Body) -> bool {
+        std::mem::swap(&mut self.held, &mut self.held_before);
         self.held.fill(false);
         for grasp in frame.rigid_grasps() {
             for node in &grasp.nodes {
@@ -151,6 +156,7 @@ impl QuasiNewtonSolver {
                 }
             }
         }
+        self.held != self.held_before
     }
 
     /// Factorises again if other nodes are held, in contact, or in a compliant grasp than in the

@@ -110,7 +110,7 @@ impl Factor {
             let width = panel.width();
             panel.inverse(level, inverse);
             let rows = panel.rows().iter().copied();
-            tiles.push(panel.first(), width, rows, |r, c| inverse[width * c + r], |r, c| panel.below(r, c));
+            tiles.push(level, panel.first(), width, rows, |r, c| inverse[width * c + r], |r, c| panel.below(r, c));
         }
     }
 

@@ -3,14 +3,16 @@
 use super::body_system::QuasiNewtonSolver;
 use super::iterate::{Iterate, max_coordinate};
 use super::sleep::RestCache;
+use crate::lanes::{Row, same_rows};
 use fearless_simd::dispatch;
 
 impl QuasiNewtonSolver {
     /// Evaluates the elements where the body is and stays, and accepts their volumes. A body that
     /// has not moved since it was last evaluated in place is not evaluated again.
     pub fn evaluate_in_place(&mut self, h: f32) {
-        let Iterate { x, start, .. } = &self.iterate;
-        if self.elements.in_place && *x == self.rest.x && *start == self.rest.start {
+        let (Iterate { x, start, .. }, rest) = (&self.iterate, &self.rest);
+        let same = |a: &[Row], b: &[Row]| same_rows(self.level, a, b);
+        if self.elements.in_place && same(x, &rest.x) && same(start, &rest.start) {
             return;
         }
         let Self { level, elements, layout, iterate, rest, .. } = self;
@@ -25,9 +27,9 @@ impl QuasiNewtonSolver {
     /// Writes the gradient of elements and inertia into the next gradient: a known one while the body
     /// stays where it is.
     pub fn take_own_gradient(&mut self, h: f32) {
-        let Self { elements, iterate, rest, .. } = self;
-        let stays = elements.in_place && iterate.x == rest.x;
-        if stays && rest.has_gradient && iterate.predictor == rest.predictor {
+        let Self { level, elements, iterate, rest, .. } = self;
+        let stays = elements.in_place && same_rows(*level, &iterate.x, &rest.x);
+        if stays && rest.has_gradient && same_rows(*level, &iterate.predictor, &rest.predictor) {
             iterate.next_gradient.copy_from_slice(&rest.gradient);
             return;
         }
@@ -59,8 +61,10 @@ impl QuasiNewtonSolver {
     /// are not in the factor.
     pub fn correction_at_rest(&mut self) -> f32 {
         let free = self.layout.free;
-        let Self { rest: RestCache { correction_x, correction_gradient, correction, .. }, iterate, .. } = self;
-        let same = iterate.gradient == *correction_gradient && iterate.x[..free] == correction_x[..free];
+        let Self { level, rest: RestCache { correction_x, correction_gradient, correction, .. }, iterate, .. } = self;
+        let same = correction.is_some()
+            && same_rows(*level, &iterate.gradient, correction_gradient)
+            && same_rows(*level, &iterate.x[..free], &correction_x[..free]);
         if let Some(correction) = correction.filter(|_| same) {
             return correction;
         }

@@ -8,7 +8,7 @@
 //! The backward half is the exact transpose of the forward half, tile by tile. So rounding the
 //! factor to 16 bits leaves the preconditioner symmetric and positive definite.
 
-use fearless_simd::{Simd, SimdBase, SimdCvtFloat, f32x16, i32x16};
+use fearless_simd::{Level, Simd, SimdBase, SimdCvtFloat, dispatch, f32x16, i32x16};
 use std::ops::Range;
 
 /// Rows and columns of a tile.
@@ -70,6 +70,7 @@ impl Tiles {
     /// the numbers below, `below(row, column)`; `rows` are the nodes below, ascending.
     pub fn push(
         &mut self,
+        level: Level,
         first: usize,
         width: usize,
         rows: impl Iterator<Item = u32>,
@@ -83,7 +84,7 @@ impl Tiles {
         let columns = covering(width);
         for i in 0..columns {
             for j in 0..=i {
-                self.pack(|r, c| {
+                self.pack(level, |r, c| {
                     let (r, c) = (TILE_SIZE * i + r, TILE_SIZE * j + c);
                     if r < width && c <= r { inverse(r, c) } else { 0.0 }
                 });
@@ -91,7 +92,7 @@ impl Tiles {
         }
         for i in 0..covering(height) {
             for j in 0..columns {
-                self.pack(|r, c| {
+                self.pack(level, |r, c| {
                     let (r, c) = (TILE_SIZE * i + r, TILE_SIZE * j + c);
                     if r < height && c < width { below(r, c) } else { 0.0 }
                 });
@@ -100,7 +101,7 @@ impl Tiles {
         self.buffer.resize(self.buffer.len().max(TILE_SIZE * (columns + covering(height)) + TILE_SIZE), 0.0);
     }
 
-    fn pack(&mut self, at: impl Fn(usize, usize) -> f32) {
+    fn pack(&mut self, level: Level, at: impl Fn(usize, usize) -> f32) {
         let mut numbers = [[0.0f32; TILE_SIZE]; TILE_SIZE];
         let mut most = 0.0f32;
         for c in 0..TILE_SIZE {
@@ -111,13 +112,16 @@ impl Tiles {
         }
         let scale = if most > 0.0 { most / MAX_INT16 } else { 1.0 };
         let mut tile = Tile { words: [[0; TILE_SIZE]; TILE_SIZE / 2] };
-        for (pair, words) in tile.words.iter_mut().enumerate() {
-            for (r, word) in words.iter_mut().enumerate() {
-                let even = (numbers[2 * pair][r] / scale).round();
-                let odd = (numbers[2 * pair + 1][r] / scale - even / 65536.0).round().clamp(-MAX_INT16, MAX_INT16);
-                *word = (odd as i32) * 65536 + i32::from(even as i16);
+        // With the CPU's instructions for rounding.
+        dispatch!(level, _simd => {
+            for (pair, words) in tile.words.iter_mut().enumerate() {
+                for (r, word) in words.iter_mut().enumerate() {
+                    let even = (numbers[2 * pair][r] / scale).round();
+                    let odd = (numbers[2 * pair + 1][r] / scale - even / 65536.0).round().clamp(-MAX_INT16, MAX_INT16);
+                    *word = (odd as i32) * 65536 + i32::from(even as i16);
+                }
             }
-        }
+        });
         self.tiles.push(tile);
         // Both halves come out 65536 times too large.
         self.scales.push(scale / 65536.0);

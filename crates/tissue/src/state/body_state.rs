@@ -3,6 +3,7 @@
 use crate::Body;
 use crate::contact::{Anchor, FeatureAnchor, Source, Stretch};
 use glam::Vec3A;
+use trocar_lattice::BodyState as LatticeState;
 use xxhash_rust::xxh3::Xxh3;
 
 /// The state of one body, vertices in the body's internal order, positions relative to its origin.
@@ -22,6 +23,9 @@ pub(crate) struct BodyState {
     pub repair: Repair,
     /// The solvers' warm start.
     pub warm: WarmStart,
+    /// Nodes of the body's lattice, relative to the body's origin, which vertices follow; None
+    /// without a lattice.
+    pub lattice: Option<LatticeState>,
 }
 
 /// The solvers' warm start: data that they keep from frame to frame.
@@ -63,13 +67,15 @@ impl BodyState {
             stretches: Vec::new(),
             repair: Repair::default(),
             warm: WarmStart { falling: vec![0.0; body.len()], supported: vec![false; body.len()] },
+            lattice: body.lattice.as_ref().map(|lattice| lattice.at_rest()),
         }
     }
 
     /// Copies another state of the same body without allocating. Destructuring names every field:
     /// a new one that is not copied does not compile.
     pub fn copy_from(&mut self, other: &Self) {
-        let Self { x, v, anchors, feature_anchors, stretches, repair, warm: WarmStart { falling, supported } } = other;
+        let Self { x, v, anchors, feature_anchors, stretches, repair, warm, lattice } = other;
+        let WarmStart { falling, supported } = warm;
         self.x.copy_from_slice(x);
         self.v.copy_from_slice(v);
         self.anchors.clone_from(anchors);
@@ -78,12 +84,13 @@ impl BodyState {
         self.repair = *repair;
         self.warm.falling.copy_from_slice(falling);
         self.warm.supported.copy_from_slice(supported);
+        self.lattice.clone_from(lattice);
     }
 
     /// Hashes every bit. Destructuring names every field: a new one that is not hashed does not
     /// compile.
     pub fn hash(&self, hash: &mut Xxh3) {
-        let Self { x, v, anchors, feature_anchors, stretches, repair, warm } = self;
+        let Self { x, v, anchors, feature_anchors, stretches, repair, warm, lattice } = self;
         let WarmStart { falling, supported } = warm;
         let Repair { disturbed, relax } = repair;
         for vector in x.iter().chain(v) {
@@ -115,6 +122,11 @@ impl BodyState {
         }
         for flag in supported.iter().chain([disturbed, relax]) {
             hash.update(&[u8::from(*flag)]);
+        }
+        if let Some(LatticeState { positions, velocities }) = lattice {
+            for number in positions.iter().chain(velocities).flat_map(|p| p.to_array()) {
+                hash.update(&number.to_bits().to_le_bytes());
+            }
         }
     }
 }

@@ -5,15 +5,15 @@ mod motion;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use body_state::{BodyState, WarmStart};
+pub(crate) use body_state::{BodyState, Repair, WarmStart};
 pub use motion::BodyMotion;
 
 use crate::contact::Source;
-use crate::{Body, Grasp, Model};
+use crate::{Body, Grasp, Hole, Model};
 use glam::{DVec3, Vec3A};
 use xxhash_rust::xxh3::Xxh3;
 
-/// Positions, velocities and grasps at one instant. Cloning a state saves it; assigning the clone
+/// Positions, velocities, grasps and holes at one instant. Cloning a state saves it; assigning the clone
 /// restores it exactly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
@@ -22,6 +22,8 @@ pub struct State {
     /// The grasps in force. Adding one closes it. Removing it opens it, and its nodes are free. A
     /// node in several grasps follows the last, but a rigid one before a compliant one.
     pub grasps: Vec<Grasp>,
+    /// Holes through which tools pass. Adding one lets the tools through; removing it closes it.
+    pub holes: Vec<Hole>,
     /// One for each body.
     pub(crate) bodies: Vec<BodyState>,
 }
@@ -30,15 +32,16 @@ impl State {
     /// The model at rest in its rest shape.
     pub fn new(model: &Model) -> Self {
         let bodies = model.bodies.iter().map(BodyState::at_rest).collect();
-        Self { time: 0.0, grasps: Vec::new(), bodies }
+        Self { time: 0.0, grasps: Vec::new(), holes: Vec::new(), bodies }
     }
 
-    /// Whether every grasp holds nodes that the model has.
-    pub(crate) fn grasps_fit(&self, model: &Model) -> bool {
-        self.grasps.iter().all(|grasp| {
+    /// Whether the nodes of every grasp and hole are nodes that the model has.
+    pub(crate) fn names_nodes_of(&self, model: &Model) -> bool {
+        let holds = |grasp: &Grasp| {
             let nodes = model.bodies.get(grasp.body).map_or(0, |body| body.len());
             grasp.nodes.len() == grasp.captured.len() && grasp.nodes.iter().all(|i| (*i as usize) < nodes)
-        })
+        };
+        self.grasps.iter().all(holds) && self.holes.iter().all(|hole| hole.fits(model))
     }
 
     /// The motion of a body, in double precision and node order.
@@ -78,7 +81,7 @@ impl State {
     }
 
     /// Copies positions, velocities and the anchors of friction on supports from another state.
-    /// Other friction and the grasps stay. Returns false, and changes nothing, if the other state
+    /// Other friction, the grasps and the holes stay. Returns false, and changes nothing, if the other state
     /// has other bodies.
     pub fn copy_motion(&mut self, other: &Self) -> bool {
         let sizes = |state: &Self| state.bodies.iter().map(|body| body.x.len()).collect::<Vec<_>>();
@@ -88,6 +91,7 @@ impl State {
         for (to, from) in self.bodies.iter_mut().zip(&other.bodies) {
             to.x.copy_from_slice(&from.x);
             to.v.copy_from_slice(&from.v);
+            to.lattice.clone_from(&from.lattice);
             to.anchors.clear();
             to.feature_anchors.clear();
             to.anchors.extend(from.anchors.iter().filter(|anchor| matches!(anchor.source, Source::Support(_))));
@@ -136,6 +140,9 @@ impl State {
     pub fn stop(&mut self) {
         for body in &mut self.bodies {
             body.v.fill(Vec3A::ZERO);
+            if let Some(lattice) = &mut body.lattice {
+                lattice.velocities.fill(DVec3::ZERO);
+            }
         }
     }
 
@@ -148,11 +155,12 @@ impl State {
     /// Hash over every bit of the state. Destructuring names every field: a new one that is not
     /// hashed does not compile.
     pub fn hash(&self) -> u64 {
-        let Self { time, grasps, bodies } = self;
+        let Self { time, grasps, holes, bodies } = self;
         let mut hash = Xxh3::new();
         hash.update(&time.to_bits().to_le_bytes());
         bodies.iter().for_each(|body| body.hash(&mut hash));
         grasps.iter().for_each(|grasp| grasp.hash(&mut hash));
+        holes.iter().for_each(|hole| hole.hash(&mut hash));
         hash.digest()
     }
 }

@@ -5,10 +5,14 @@
 use super::State;
 use super::body_state::{BodyState, Repair, WarmStart};
 use crate::contact::{Anchor, FeatureAnchor, Source, Stretch};
-use crate::{BodyDescription, Compliance, ConstitutiveModel, Grasp, Material, Model, ModelBuilder};
+use crate::{
+    Backend, BodyDescription, Compliance, ConstitutiveModel, Grasp, Hole, LatticeSettings, Material, Model,
+    ModelBuilder,
+};
 use glam::{DVec3, Vec3A};
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
+use trocar_lattice::BodyState as LatticeState;
 
 /// Two elements.
 fn model() -> Model {
@@ -23,7 +27,8 @@ fn model() -> Model {
         viscosity: 0.0,
     };
     let body = BodyDescription { name: "body".into(), mesh: &mesh, material, pinned: vec![], supports: vec![] };
-    let mut builder = ModelBuilder::new();
+    let backend = Backend::Lattice(LatticeSettings { cell: 0.02, ..LatticeSettings::default() });
+    let mut builder = ModelBuilder::new().backend(backend);
     builder.body(body).unwrap();
     builder.build().unwrap()
 }
@@ -51,6 +56,7 @@ fn full(model: &Model) -> State {
     };
     let grasp = Grasp::capture(model, &state, 0, &[0, 3], 1, &Pose::IDENTITY).compliant(compliance);
     state.grasps.push(grasp);
+    state.holes.push(Hole { body: 1, tools: vec![2], nodes: vec![3, 5] });
     state
 }
 
@@ -70,7 +76,8 @@ fn vectors(list: fn(&mut BodyState) -> &mut Vec<Vec3A>, vertices: usize) -> Vec<
 /// A change of each number of the body's state. Destructuring names every field: a new one that has
 /// no change here does not compile.
 fn body_changes(body: &BodyState) -> Vec<Change> {
-    let BodyState { x, v, anchors, feature_anchors, stretches, repair: Repair { disturbed, relax }, warm } = body;
+    let BodyState { x, v, anchors, feature_anchors, stretches, repair, warm, lattice } = body;
+    let Repair { disturbed, relax } = repair;
     let WarmStart { falling, supported } = warm;
     let mut all = vectors(|body| &mut body.x, x.len());
     assert!(!*disturbed && !*relax && anchors.len() == 1 && stretches.len() == 1);
@@ -95,6 +102,12 @@ fn body_changes(body: &BodyState) -> Vec<Change> {
     all.push(change(|s| s.bodies[0].stretches[0].vertex += 1));
     all.push(change(|s| s.bodies[0].stretches[0].other += 1));
     all.extend((0..3).map(|c| change(move |s| s.bodies[0].stretches[0].by[c] += 1.0)));
+    let LatticeState { positions, velocities } = lattice.as_ref().unwrap();
+    assert_eq!(positions.len(), velocities.len());
+    for (i, c) in (0..positions.len()).flat_map(|i| (0..3).map(move |c| (i, c))) {
+        all.push(change(move |s| s.bodies[0].lattice.as_mut().unwrap().positions[i][c] += 1.0));
+        all.push(change(move |s| s.bodies[0].lattice.as_mut().unwrap().velocities[i][c] += 1.0));
+    }
     all.push(change(|s| s.bodies[0].repair.disturbed ^= true));
     all.push(change(|s| s.bodies[0].repair.relax ^= true));
     all
@@ -135,11 +148,16 @@ fn grasp_changes(grasp: &Grasp) -> Vec<Change> {
 fn hash_and_copies_carry_every_number() {
     let model = model();
     let state = full(&model);
-    let State { time: _, grasps, bodies } = &state;
+    let State { time: _, grasps, holes, bodies } = &state;
+    let Hole { body: _, tools: _, nodes: _ } = &holes[0];
     let mut changes = body_changes(&bodies[0]);
     let of_body = changes.len();
     changes.extend(grasp_changes(&grasps[0]));
     changes.push(change(|s| s.time += 1.0));
+    changes.push(change(|s| s.holes[0].body += 1));
+    changes.push(change(|s| s.holes[0].tools[0] += 1));
+    changes.push(change(|s| s.holes[0].nodes[1] += 1));
+    changes.push(change(|s| s.holes.clear()));
     let mut hashes = vec![state.hash()];
     for (k, change) in changes.iter().enumerate() {
         let mut changed = state.clone();

@@ -28,7 +28,7 @@ pub(crate) fn episode(recording: &Recording, pictures: &Pictures, real_time_fact
     Ok(page::page(&title, &subtitle, &body))
 }
 
-/// The end of the episode, its reason, and suspensions of physics, as HTML.
+/// The end of the episode, its reason, and warnings, as HTML.
 fn lead(s: &Summary) -> String {
     let end = s.end.as_ref().map_or("no end".to_owned(), ToString::to_string);
     let why = s.why.clone().filter(|why| *why != end);
@@ -36,7 +36,7 @@ fn lead(s: &Summary) -> String {
         ("Ended", Some(end)),
         ("Not passed", why),
         ("Note", s.advice.clone()),
-        ("Suspensions of physics", s.suspensions()),
+        ("Beyond what tissue bears", s.warnings.described()),
     ];
     let said = said.into_iter().filter_map(|(what, text)| Some(format!("<b>{what}:</b> {}.", page::escape(&text?))));
     said.collect::<Vec<_>>().join(" ")
@@ -74,7 +74,7 @@ fn cards(recording: &Recording, real_time_factor: f64) -> String {
     );
     cards.push(Card::new("Peak force", format!("{} N", fixed(over_time::peak(s, |a| a.peak_contact_n), 2)), contact));
     cards.push(over_time::inverted_card(s));
-    cards.push(over_time::suspensions_card(s));
+    cards.push(over_time::warnings_card(s));
     page::cards(&cards)
 }
 
@@ -108,7 +108,7 @@ fn arms(recording: &Recording) -> String {
             ("Jaw (N)", &|a| fixed(a.peak_jaw_n, 2)),
             ("Solids (N)", &|a| fixed(a.peak_solid_n, 2)),
             ("Tilt (\u{b0})", &|a| fixed(a.tilt_max_deg, 1)),
-            ("Periods without contact", &|a| (a.contact_disabled + a.blades_disabled).to_string()),
+            ("Periods inside an organ", &|a| a.pierces.to_string()),
             ("Commands shortened", &|a| a.guarded.to_string()),
         ],
     );

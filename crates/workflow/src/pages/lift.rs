@@ -25,8 +25,8 @@ pub(super) fn sections(lifted: &FinishedLift) -> Result<(String, String)> {
     if let Some(advice) = &s.advice {
         lead += &format!(" <b>Note:</b> {}.", page::escape(advice));
     }
-    if let Some(said) = s.suspensions() {
-        lead += &format!(" <b>Suspensions of physics:</b> {}.", page::escape(&said));
+    if let Some(said) = s.warnings.described() {
+        lead += &format!(" <b>Beyond what tissue bears:</b> {}.", page::escape(&said));
     }
     let title = if s.diverged { "The lift (diverged)" } else { "The lift" };
     let mut first = page::section(title, &lead, &cards(lifted)) + &over_time::pictures(&lifted.pictures)?;
@@ -80,7 +80,7 @@ fn cards(lifted: &FinishedLift) -> String {
             format!("constraint; contact {} N", fixed(over_time::peak(s, |a| a.peak_contact_n), 2)),
         ),
         over_time::inverted_card(s),
-        over_time::suspensions_card(s),
+        over_time::warnings_card(s),
         Card::new("Speed", format!("{}\u{d7}", fixed(r.real_time_factor, 2)), "of real time, arms and tissue"),
     ]);
     if s.arms.iter().any(|a| a.rcm_peak_mm > 0.0) {

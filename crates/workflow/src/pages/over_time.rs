@@ -56,11 +56,10 @@ pub(super) fn inverted_card(s: &Summary) -> Card {
     Card::new("Inverted elements", s.inverted_peak.to_string(), "maximum of any frame").met(s.inverted_peak == 0)
 }
 
-/// The card with the suspensions of physics.
-pub(super) fn suspensions_card(s: &Summary) -> Card {
-    let count = s.disabled_contacts + s.disabled_blades + s.relaxed;
-    let note = s.suspensions().unwrap_or_else(|| "of physics by safety rules".to_owned());
-    Card::new("Suspensions", count.to_string(), note).met(count == 0)
+/// The card with what was beyond what tissue bears.
+pub(super) fn warnings_card(s: &Summary) -> Card {
+    let note = s.warnings.described().unwrap_or_else(|| "nothing was beyond what tissue bears".to_owned());
+    Card::new("Warnings", s.warnings.total().to_string(), note).met(s.warnings.is_empty())
 }
 
 /// The section of pictures; empty without pictures.

@@ -103,8 +103,6 @@ impl ArmUnit {
     pub fn let_go(&mut self, world: &mut World, events: &mut Vec<CellEvent>) {
         let tool = self.model.tools.gripper;
         world.state.grasps.retain(|g| g.tool != tool);
-        // Blades whose contact was disabled are inside tissue, which they would drag along.
-        self.state.contact_disabled |= std::mem::take(&mut self.state.blades_disabled);
         if self.state.held.take().is_some() {
             self.state.design = self.model.design;
             events.push(CellEvent::Released { arm: self.model.side });

@@ -30,6 +30,8 @@ pub(super) struct ArmModel {
     pub force_limit: f64,
     /// Force of solids at which an ideal arm stops (N).
     pub stop_force: f64,
+    /// Force with which the instrument has to press on an organ to puncture it (N).
+    pub puncture_force: f64,
     /// RCM deviations that are reported (m): the scene's threshold, and the limit at which hardware
     /// stops.
     pub rcm_limits: [f64; 2],

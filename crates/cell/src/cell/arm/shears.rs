@@ -31,7 +31,7 @@ impl ArmUnit {
         let between = |open: &Gripper| JawRegion::sized(open, length).fullest(world).map(|(organ, _)| organ);
         if let Some(jaw_angle) = self.state.shears
             && between(&Gripper { jaw_angle, ..self.state.gripper }).is_none()
-            && self.inside_organ(world, 3).is_none()
+            && self.inside_organs(world, 3).is_empty()
         {
             self.state.shears = None;
         }

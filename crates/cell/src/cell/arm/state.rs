@@ -3,6 +3,7 @@
 use super::ArmModel;
 use crate::bite::Bite;
 use crate::cell::exchange::Exchange;
+use crate::cell::pressed::Pressed;
 use crate::cell::rules::ForceGuard;
 use crate::cell::setpoint::Setpoint;
 use crate::cell::solid::SolidLoad;
@@ -54,6 +55,7 @@ pub(crate) struct ArmState {
     pub exchange: Exchange,
     /// The force of solids.
     pub solid: SolidLoad,
+    pub pressed: Pressed,
     pub forces: [ToolForce; 3],
     pub scissors: Scissors,
     /// Angle of a cutter's blades (rad) before they began to close through tissue. Such blades
@@ -65,10 +67,8 @@ pub(crate) struct ArmState {
     pub held: Option<Held>,
     /// Tissue frames for which jaws that closed on tissue have stood where they are commanded.
     pub standing: u32,
-    /// Whether contact of the whole instrument is disabled.
-    pub contact_disabled: bool,
-    /// Whether contact of the blades is disabled, until they release their grasp.
-    pub blades_disabled: bool,
+    /// Whether the instrument's axis is inside an organ.
+    pub pierces: bool,
     /// Largest RCM deviation of the period so far (m).
     pub rcm_peak: f64,
     /// Which of the RCM limits are exceeded, and that was reported.
@@ -123,6 +123,7 @@ impl ArmState {
             jaw_rate: 0.0,
             exchange: Exchange::new(pose.translation),
             solid: SolidLoad::default(),
+            pressed: Pressed::default(),
             forces: [ToolForce::default(); 3],
             scissors,
             shears: None,
@@ -130,8 +131,7 @@ impl ArmState {
             parting: None,
             held: None,
             standing: 0,
-            contact_disabled: false,
-            blades_disabled: false,
+            pierces: false,
             rcm_peak: 0.0,
             rcm_reported: [false; 2],
         }
@@ -152,6 +152,7 @@ impl ArmState {
             jaw_rate,
             exchange,
             solid,
+            pressed,
             forces,
             scissors,
             shears,
@@ -159,8 +160,7 @@ impl ArmState {
             parting,
             held,
             standing,
-            contact_disabled,
-            blades_disabled,
+            pierces,
             rcm_peak,
             rcm_reported,
         } = self;
@@ -184,15 +184,7 @@ impl ArmState {
             }
             all.extend([*pressing, *touching as f64]);
         }
-        let flags = [
-            *contact_disabled,
-            *blades_disabled,
-            *held_back,
-            *guarded,
-            rcm_reported[0],
-            rcm_reported[1],
-            held.is_some(),
-        ];
+        let flags = [*pierces, *held_back, *guarded, rcm_reported[0], rcm_reported[1], held.is_some()];
         all.extend(flags.map(|b| f64::from(u8::from(b))));
         all.push(GraspDesign::ALL.iter().position(|d| d == design).unwrap_or(0) as f64);
         if let Some(Held { organ, s, hold, opening }) = held {
@@ -205,6 +197,7 @@ impl ArmState {
             all.push(f64::from(*standing));
         }
         all.extend(solid.numbers());
+        all.extend(pressed.numbers());
         all.extend(bite.iter().flat_map(Bite::numbers));
         all.extend(parting.iter().flat_map(Parting::numbers));
         all

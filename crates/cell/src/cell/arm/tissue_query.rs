@@ -1,7 +1,7 @@
 //! Queries about an arm's instrument and the tissue near it.
 
 use super::ArmUnit;
-use crate::cell::inside::first_organ_around;
+use crate::cell::inside::{Crossing, crossings};
 use crate::cell::solid::Rod;
 use crate::{Gripper, World};
 use glam::DVec3;
@@ -11,7 +11,7 @@ use trocar_tissue::Shape;
 impl ArmUnit {
     /// Whether the instrument may be the cause of the tissue's strain.
     pub fn meets_tissue(&self) -> bool {
-        self.state.contact_disabled || self.state.held.is_some() || self.state.forces.iter().any(|f| f.touching > 0)
+        self.state.held.is_some() || self.state.forces.iter().any(|f| f.touching > 0)
     }
 
     /// Distance of a point from the instrument's axis, from the blades' tips up its shaft (m).
@@ -58,27 +58,35 @@ impl ArmUnit {
         [(self.model.tools.gripper, gripper.pose), one, two]
     }
 
-    /// The organ that a part of the instrument with contact has pierced, except what the jaws hold
-    /// and the blades shear.
-    pub fn pierces(&self, world: &World) -> Option<usize> {
-        let felt = if self.state.shears.is_some() || self.state.blades_disabled { 1 } else { 3 };
-        self.inside_organ(world, felt)
+    /// The organs that a part of the instrument is inside of, except what the jaws hold and the blades
+    /// shear, and those in a hole of which it is; each with a place there (m).
+    pub fn pierces(&self, world: &World) -> Vec<(usize, DVec3)> {
+        let felt = if self.state.shears.is_some() { 1 } else { 3 };
+        let mut organs = self.inside_organs(world, felt);
+        organs.retain(|(organ, _)| !world.is_punctured(*organ, self.model.tools.gripper));
+        organs
     }
 
-    /// The organ that one of the first `count` tools is inside of: the shaft, then the blades.
-    pub fn inside_organ(&self, world: &World, count: usize) -> Option<usize> {
+    /// The organs that one of the first `count` tools is inside of: the shaft, then the blades; each
+    /// with a place there (m).
+    pub fn inside_organs(&self, world: &World, count: usize) -> Vec<(usize, DVec3)> {
         let Self { model, state, .. } = self;
-        let spared = state.held.as_ref().map(|held| held.organ);
+        let mut found: Vec<(usize, DVec3)> = Vec::new();
         for (tool, frame) in self.frames_of(&state.gripper).into_iter().take(count) {
             let axes = model.parts.iter().filter(|part| part.tool == tool).filter_map(|part| match part.shape {
                 Shape::Capsule { ends, .. } => Some(ends.map(|p| frame.transform(p))),
                 _ => None,
             });
             let axes: Vec<[DVec3; 2]> = axes.collect();
-            if let Some((organ, _)) = first_organ_around(world, &axes, spared) {
-                return Some(organ);
+            for organ in (0..world.model.bodies().len()).filter(|organ| !self.holds(*organ)) {
+                if let Some(Crossing { segment, part: [begin, end], .. }) = crossings(world, organ, &axes).first()
+                    && !found.iter().any(|(known, _)| *known == organ)
+                {
+                    let [from, to] = axes[*segment];
+                    found.push((organ, from.lerp(to, 0.5 * (begin + end))));
+                }
             }
         }
-        None
+        found
     }
 }

@@ -10,7 +10,7 @@ use trocar_tissue::Event;
 impl Cell {
     pub(super) fn exchange_forces(&mut self, log: &mut PeriodLog) -> Result<()> {
         for k in 0..self.arms.len() {
-            if let Some(sheared) = self.arms[k].take_forces(&mut self.world, &mut log.events) {
+            if let Some(sheared) = self.arms[k].take_forces(&mut self.world, self.physics_steps, &mut log.events) {
                 self.cut(k, &sheared, &mut log.events)?;
             }
         }
@@ -19,11 +19,13 @@ impl Cell {
 }
 
 impl ArmUnit {
-    /// Takes the forces of the frame, and lets the jaws grasp and release. Returns what a cutter has
-    /// done.
-    fn take_forces(&mut self, world: &mut World, events: &mut Vec<CellEvent>) -> Option<Sheared> {
+    /// Takes the forces of the frame of `steps` physics steps, and lets the jaws grasp and release.
+    /// Returns what a cutter has done.
+    fn take_forces(&mut self, world: &mut World, steps: u32, events: &mut Vec<CellEvent>) -> Option<Sheared> {
         let Self { model, state, .. } = self;
         state.forces = model.tools.forces(world.forces());
+        let organs = 0..world.model.bodies().len();
+        state.pressed.end_frame(steps, organs.map(|organ| model.tools.all().map(|tool| world.force_of(organ, tool))));
         state.exchange.end_frame(state.gripper.pose.translation, &state.forces);
         for event in world.events() {
             match *event {

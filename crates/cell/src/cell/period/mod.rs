@@ -13,6 +13,7 @@ mod cutting;
 mod exchange_forces;
 mod move_arms;
 mod observe;
+mod puncture;
 mod stop_in_time;
 mod tissue_frame;
 
@@ -53,7 +54,8 @@ impl Cell {
             let tissue = stepper.step_with_loads(model, state, &self.motions, &[]);
             self.end_tissue_frame(start, &tissue, &mut log);
             self.exchange_forces(&mut log)?;
-            let at_arms = self.enforce_tissue_limits(tissue.min_volume_ratio, &mut log);
+            self.puncture(&mut log);
+            let at_arms = self.watch_tissue(tissue.min_volume_ratio, &mut log);
             self.stop_in_time(&at_arms);
             // The time of whoever watches is not the cell's.
             wall += clock.elapsed();

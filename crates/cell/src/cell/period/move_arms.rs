@@ -14,6 +14,7 @@ impl Cell {
     pub(super) fn move_arms(&mut self, frame: u32, log: &mut PeriodLog) -> Result<()> {
         let clock = Instant::now();
         let dt = FRAME / f64::from(self.physics_steps);
+        self.solids.holes.clone_from(&self.world.state.holes);
         for step in 0..self.physics_steps {
             if frame * self.physics_steps + step == self.delay.step {
                 self.command(log)?;

@@ -1,4 +1,4 @@
-//! Stage 7: measurements at the end of the period.
+//! Stage 8: measurements at the end of the period.
 
 use crate::blades::{Tools, opening_force};
 use crate::cell::Cell;

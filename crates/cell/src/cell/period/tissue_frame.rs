@@ -81,10 +81,7 @@ impl ArmUnit {
         // At rest, far from tissue.
         let away = Pose { translation: OUT_OF_CONTACT_HEIGHT * DVec3::Z, ..Pose::IDENTITY };
         let away = ToolMotion { from: away, to: away };
-        if state.contact_disabled {
-            return [away; 3];
-        }
-        if state.shears.is_some() || state.blades_disabled {
+        if state.shears.is_some() {
             motions[1..].fill(away);
         }
         motions

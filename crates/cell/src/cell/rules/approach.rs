@@ -7,6 +7,7 @@ use super::force_guard::FASTEST_TOUCH;
 use crate::cell::arm::ArmUnit;
 use crate::{FRAME, World};
 use glam::DVec3;
+use trocar_tissue::Hole;
 
 /// The instrument is looked for where it would be after so many tissue frames.
 const FRAMES_AHEAD: [f64; 2] = [1.0, 2.0];
@@ -16,10 +17,14 @@ const FRAMES_AHEAD: [f64; 2] = [1.0, 2.0];
 /// slower than [`FASTEST_TOUCH`].
 pub(in crate::cell) fn hit_ahead(world: &World, arm: &ArmUnit, way: DVec3) -> DVec3 {
     let (mut fastest, mut out) = (FASTEST_TOUCH * FRAME, DVec3::ZERO);
-    if way.length() <= fastest || arm.state.contact_disabled {
+    if way.length() <= fastest {
         return out;
     }
     let rods = arm.rods();
+    let holes: Vec<&Hole> = world.state.holes.iter().filter(|h| h.tools.contains(&arm.model.tools.gripper)).collect();
+    let in_hole = |organ: usize, node: usize| {
+        holes.iter().any(|hole| hole.body == organ && hole.nodes.binary_search(&(node as u32)).is_ok())
+    };
     for shift in FRAMES_AHEAD.map(|frames| frames * way) {
         let ends = rods.iter().flat_map(|rod| rod.ends.map(|p| (p + shift, rod.radius)));
         let (low, high) = ends.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), (p, radius)| {
@@ -28,7 +33,7 @@ pub(in crate::cell) fn hit_ahead(world: &World, arm: &ArmUnit, way: DVec3) -> DV
         for (organ, body) in world.model.bodies().iter().enumerate().filter(|(organ, _)| !arm.holds(*organ)) {
             for node in 0..body.len() {
                 let p = world.state.position(&world.model, organ, node);
-                if p.cmplt(low).any() || p.cmpgt(high).any() {
+                if p.cmplt(low).any() || p.cmpgt(high).any() || in_hole(organ, node) {
                     continue;
                 }
                 for rod in &rods {

@@ -1,32 +1,26 @@
-//! Safety rules: the cell departs from plain physics so that no command breaks tissue or solver.
-//! Each rule has its own file, reports an event, and is counted.
+//! Safety: what stops the arms, and what warns of tissue beyond what tissue bears.
 //!
-//! | rule | when | what it does |
+//! | module | when | what it does |
 //! |---|---|---|
-//! | [`force_guard`] | tissue pushes with nearly the scene's limit | shortens the command |
-//! | [`pierce`] | an instrument has gone through an organ's surface | disables its contact |
-//! | [`overstretch`] | tissue near an instrument is strained beyond what tissue bears | disables contact |
-//! | [`reconnect`] | the instrument is out, and tissue has come back | enables contact again |
-//! | [`relax`] | an organ stays folded with no instrument at it | relaxes it outside of time |
+//! | [`force_guard`] | tissue pushes with nearly the scene's limit, or is strained or hit fast | shortens the command, stops the arm |
+//! | [`pierce`] | the axis of an instrument is inside an organ that it has not punctured | counts, reports an event |
+//! | [`overstretch`] | tissue near an instrument is strained beyond what tissue bears | the same |
+//! | [`fold`] | an organ stays strained with no instrument at it | the same |
 //!
-//! A scene turns rules off in `[safety.rules]`. [`reconnect`] undoes the effects of the other rules
-//! and has no switch.
-//!
-//! Contact of latched jaws is disabled in two steps: first that of the blades, which keep their
-//! grasp, then that of the whole instrument, which releases it.
+//! The guard acts on arms. Nothing here changes the physics of tissue. A scene turns the guard off
+//! in `[safety.rules]`.
 
 mod approach;
-mod enforce;
+mod fold;
 mod force_guard;
 mod overstretch;
 mod pierce;
-mod reconnect;
-mod relax;
-mod scope;
 mod strain;
 mod tissue_at_arm;
+mod watch;
 
 pub(super) use approach::hit_ahead;
 pub(super) use force_guard::ForceGuard;
 pub(super) use strain::Edges;
 pub(super) use tissue_at_arm::TissueAtArm;
+pub(super) use watch::OrganWatch;

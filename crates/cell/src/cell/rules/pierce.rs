@@ -1,22 +1,22 @@
-//! Rule: contact of an instrument that has pierced an organ is disabled.
+//! Warns of an instrument that has pierced an organ: the axis of one of its convex parts is inside.
 //!
-//! Contact of tissue is at the vertices of its surface. A blade that presses hard can stretch a
-//! triangle so far that it passes between the vertices; from inside it would drag them along
-//! without limit. Real tissue would be pierced. So contact of an instrument is disabled when the
-//! axis of one of its convex parts is inside an organ, deeper than the part is thick. Held tissue
-//! may bulge round the jaws and does not count.
+//! Contact keeps tissue outside of an instrument's axis, and an instrument that presses harder than
+//! tissue bears punctures it. What comes in with less force did so because the mesh or the contact
+//! gave way. Held tissue may bulge round the jaws and does not count, nor does what blades shear.
 
-use super::scope::Scope;
+use crate::World;
+use crate::cell::arm::ArmUnit;
+use crate::cell::report::{CellEvent, PeriodLog};
 
-pub(super) fn apply(scope: &mut Scope<'_>) {
-    for k in 0..scope.arms.len() {
-        let arm = &scope.arms[k];
-        if !arm.meets_tissue() || arm.state.contact_disabled {
-            continue;
+pub(super) fn warn(world: &World, arms: &mut [ArmUnit], log: &mut PeriodLog) {
+    for arm in arms {
+        let near = arm.state.pierces || arm.meets_tissue();
+        let organ = if near { arm.pierces(world).first().map(|(organ, _)| *organ) } else { None };
+        if let Some(organ) = organ.filter(|_| !arm.state.pierces) {
+            log.rules.pierced += 1;
+            let organ = world.model.bodies()[organ].name().to_owned();
+            log.events.push(CellEvent::Pierced { arm: arm.model.side, organ });
         }
-        if let Some(organ) = arm.pierces(scope.world) {
-            scope.log.rules.pierced += 1;
-            scope.disable_contact(k, organ);
-        }
+        arm.state.pierces = organ.is_some();
     }
 }

@@ -1,22 +1,19 @@
-//! The strain of organs, and the limits of the rules.
+//! The strain of organs, and the limits beyond which it is reported.
 
 use crate::World;
 use glam::DVec3;
 
-/// Stretch of an edge at which contact of the nearest instrument is disabled.
+/// Stretch of an edge beyond what tissue bears.
 pub(super) const MAX_STRETCH: f64 = 5.0;
 
-/// Stretch at which latched jaws release at once: at ten the solver reports divergence.
-pub(super) const MAX_LATCHED_STRETCH: f64 = 6.5;
-
-/// Contact is enabled again when every edge is below this stretch.
+/// An organ has recovered when every edge is below this stretch ...
 const RESTED_STRETCH: f64 = 3.0;
 
 /// An element below this share of its rest volume is crushed. The strongest grasps of lifts leave
 /// more; below a thousandth the solvers make no progress.
 pub(super) const MIN_VOLUME_SHARE: f64 = 0.01;
 
-/// Contact is enabled again when every element is above this share of its rest volume.
+/// ... and every element is above this share of its rest volume.
 const RESTED_VOLUME_SHARE: f64 = 0.05;
 
 /// Volumes are measured if an element is below this share of its rest volume.
@@ -28,7 +25,7 @@ pub(super) const SQUEEZED: f64 = 0.2;
 
 /// Number of frames for which an organ may stay strained after the last instrument has left it:
 /// elastic tissue has recovered by then.
-pub(super) const MAX_WAIT_FRAMES: u32 = 15;
+pub(super) const MAX_FRAMES_ALONE: u32 = 15;
 
 /// The worst strain of an organ.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,16 +41,9 @@ pub(crate) struct Strain {
 }
 
 impl Strain {
-    /// Whether tissue does not survive it.
+    /// Whether real tissue does not survive it.
     pub fn is_too_much(&self) -> bool {
-        self.is_beyond(false)
-    }
-
-    /// Whether contact of the instrument has to be disabled. `latched`: only its latch holds the
-    /// organ, and its blades press on nothing. The tearing force limits the pull then; the stretch
-    /// is limited for the solver.
-    pub fn is_beyond(&self, latched: bool) -> bool {
-        self.stretch > if latched { MAX_LATCHED_STRETCH } else { MAX_STRETCH } || self.volume < MIN_VOLUME_SHARE
+        self.stretch > MAX_STRETCH || self.volume < MIN_VOLUME_SHARE
     }
 
     /// Whether the organ has not recovered.

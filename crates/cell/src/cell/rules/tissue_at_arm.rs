@@ -2,10 +2,11 @@
 
 use super::overstretch;
 use super::strain::Strain;
+use crate::World;
 use crate::cell::arm::ArmUnit;
 
 /// Stretch of an edge and share of its rest volume of an element at which the force guard stops an
-/// arm. The other rules act later.
+/// arm. Warnings come later.
 const MAX_STRETCH: f64 = 4.0;
 const MIN_VOLUME: f64 = 0.03;
 
@@ -34,14 +35,14 @@ impl Default for TissueAtArm {
 }
 
 impl TissueAtArm {
-    /// That of `arm`, with the strains of all organs.
-    pub fn of(arm: &ArmUnit, strains: &[Strain]) -> Self {
+    /// That of `arm`, with the strains of all organs of `world`.
+    pub fn of(world: &World, arm: &ArmUnit, strains: &[Strain]) -> Self {
         let mut worst = Self { held: arm.state.held.is_some(), ..Self::default() };
         for (organ, strain) in strains.iter().enumerate() {
-            if overstretch::is_at(arm, strain.at, organ) {
+            if overstretch::is_at(world, arm, strain.at, organ) {
                 worst.stretch = worst.stretch.max(strain.stretch);
             }
-            if overstretch::is_at(arm, strain.crushed_at, organ) {
+            if overstretch::is_at(world, arm, strain.crushed_at, organ) {
                 worst.volume = worst.volume.min(strain.volume);
             }
         }

@@ -17,7 +17,7 @@ pub(super) fn meet(height: f64, rods: &[Rod], found: &mut Deepest) {
         if above > 0.0 {
             let gap = above - rod.radius;
             let point = DVec3 { z: height + 0.5 * gap, ..low };
-            found.add(rod.part, Meeting { point, normal: DVec3::Z, gap, room: rod.radius });
+            found.add(rod.part, Meeting { point, normal: DVec3::Z, gap, room: rod.radius, organ: None });
         }
     }
 }

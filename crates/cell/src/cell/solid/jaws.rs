@@ -60,7 +60,7 @@ impl Solids {
     fn blades_cross(&self, arm: &ArmUnit, angle: f64) -> bool {
         let gripper = Gripper { pose: arm.drive.tip(), jaw_angle: angle };
         let blades: Vec<Rod> = arm.rods_of(&gripper).into_iter().filter(|rod| rod.part != 0).collect();
-        self.pinned.is_crossed(&blades)
+        self.pinned.is_crossed(&blades, &self.holes, arm.model.tools.gripper)
     }
 
     /// Force with which solids push the blades of `arm` apart with the jaws at `angle` (N): the

@@ -9,7 +9,7 @@ pub(super) const REACH: f64 = 5e-4;
 
 /// A place where an instrument touches a solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Meeting {
+pub(in crate::cell) struct Meeting {
     /// The place (m): midway between the two surfaces.
     pub point: DVec3,
     /// Unit vector in which the solid pushes the instrument.
@@ -18,6 +18,8 @@ pub(super) struct Meeting {
     pub gap: f64,
     /// Depth at which the axis of the instrument's part would reach the solid's, or its surface (m).
     pub room: f64,
+    /// The organ whose pinned tissue it is.
+    pub organ: Option<usize>,
 }
 
 /// The deepest meeting of each rigid part of an instrument.

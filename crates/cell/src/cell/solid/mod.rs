@@ -21,14 +21,19 @@ mod rod;
 mod spring;
 mod step;
 
+use trocar_tissue::Hole;
+
 pub(super) use load::SolidLoad;
+pub(super) use meeting::Meeting;
 pub(super) use pinned::PinnedSurface;
 pub(super) use rod::{Rod, clearance};
 
-/// What solids there are beside the instruments. It only changes when organs are cut.
+/// What solids there are beside the instruments.
 pub(super) struct Solids {
     /// Height of the bed's plane (m), if there is a bed.
     pub bed: Option<f64>,
-    /// Triangles of organs that cannot move.
+    /// Triangles of organs that cannot move. They only change when organs are cut.
     pub pinned: PinnedSurface,
+    /// The holes of the tissue's state in this frame, which let instruments through.
+    pub holes: Vec<Hole>,
 }

@@ -33,7 +33,7 @@ fn meeting(a: &Rod, b: &Rod) -> Option<Meeting> {
     }
     let normal = way / distance;
     let gap = distance - room;
-    Some(Meeting { point: q + (b.radius + 0.5 * gap) * normal, normal, gap, room })
+    Some(Meeting { point: q + (b.radius + 0.5 * gap) * normal, normal, gap, room, organ: None })
 }
 
 #[cfg(test)]

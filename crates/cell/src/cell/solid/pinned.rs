@@ -12,6 +12,7 @@ use crate::World;
 use crate::cell::ContactParts;
 use glam::DVec3;
 use trocar_geometry::{closest_on_triangle, nearest_of_segments};
+use trocar_tissue::Hole;
 
 /// Least cosine of the angle between a triangle's normal and the direction in which it pushes.
 const LEAST_COSINE: f64 = 0.5;
@@ -26,9 +27,26 @@ const LEAF: usize = 4;
 /// The pinned triangles of all organs, in a tree of boxes.
 #[derive(Debug, Default)]
 pub(in crate::cell) struct PinnedSurface {
-    /// Corners (m), counterclockwise seen from outside, in the tree's order.
-    triangles: Vec<[DVec3; 3]>,
+    /// In the tree's order.
+    triangles: Vec<Pinned>,
     nodes: Vec<Node>,
+}
+
+/// A triangle of an organ whose vertices are pinned.
+#[derive(Clone, Copy, Debug)]
+struct Pinned {
+    organ: usize,
+    nodes: [u32; 3],
+    /// Corners (m), counterclockwise seen from outside.
+    corners: [DVec3; 3],
+}
+
+impl Pinned {
+    /// Whether it is in one of the `holes`, and lets `tool` through.
+    fn lets_through(&self, holes: &[Hole], tool: usize) -> bool {
+        let open = |hole: &Hole| self.nodes.iter().any(|node| hole.nodes.binary_search(node).is_ok());
+        holes.iter().any(|hole| hole.body == self.organ && hole.tools.contains(&tool) && open(hole))
+    }
 }
 
 /// A box around triangles. Its first child follows it.
@@ -57,9 +75,10 @@ impl PinnedSurface {
             }
             let (boundary, nodes) = body.rest().boundary();
             for t in &boundary.triangles {
-                let t = t.map(|i| nodes[i as usize] as usize);
-                if t.iter().all(|i| pinned[*i]) {
-                    triangles.push(t.map(|i| world.state.position(&world.model, k, i)));
+                let nodes = t.map(|i| nodes[i as usize]);
+                if nodes.iter().all(|i| pinned[*i as usize]) {
+                    let corners = nodes.map(|i| world.state.position(&world.model, k, i as usize));
+                    triangles.push(Pinned { organ: k, nodes, corners });
                 }
             }
         }
@@ -68,28 +87,31 @@ impl PinnedSurface {
         Self { triangles, nodes }
     }
 
-    /// Adds the meetings of `rods`.
-    pub(super) fn meet(&self, rods: &[Rod], found: &mut Deepest) {
+    /// Adds the meetings of `rods`, which belong to `tool` and pass through its `holes`.
+    pub(super) fn meet(&self, rods: &[Rod], holes: &[Hole], tool: usize, found: &mut Deepest) {
         for rod in rods {
             self.for_near(&rod.ends, rod.radius + REACH, |triangle| {
-                if let Some(meeting) = meeting(rod, triangle) {
-                    found.add(rod.part, meeting);
+                if let Some(meeting) = meeting(rod, &triangle.corners).filter(|_| !triangle.lets_through(holes, tool)) {
+                    found.add(rod.part, Meeting { organ: Some(triangle.organ), ..meeting });
                 }
             });
         }
     }
 
-    /// Whether the axis of one of `rods` goes through a triangle.
-    pub(super) fn is_crossed(&self, rods: &[Rod]) -> bool {
+    /// Whether the axis of one of `rods`, which belong to `tool`, goes through a triangle that is in
+    /// none of its `holes`.
+    pub(super) fn is_crossed(&self, rods: &[Rod], holes: &[Hole], tool: usize) -> bool {
         let mut crossed = false;
         for rod in rods {
-            self.for_near(&rod.ends, 0.0, |triangle| crossed |= crosses(&rod.ends, triangle));
+            self.for_near(&rod.ends, 0.0, |triangle| {
+                crossed |= crosses(&rod.ends, &triangle.corners) && !triangle.lets_through(holes, tool);
+            });
         }
         crossed
     }
 
     /// Calls `found` for the triangles whose boxes are within `reach` (m) of a segment.
-    fn for_near(&self, segment: &[DVec3; 2], reach: f64, mut found: impl FnMut(&[DVec3; 3])) {
+    fn for_near(&self, segment: &[DVec3; 2], reach: f64, mut found: impl FnMut(&Pinned)) {
         let mut at = 0;
         while let Some(node) = self.nodes.get(at) {
             if !near_box(segment, reach, node) {
@@ -103,11 +125,11 @@ impl PinnedSurface {
 }
 
 /// Appends the tree over `triangles`, the first of which is number `first`.
-fn build(triangles: &mut [[DVec3; 3]], first: usize, nodes: &mut Vec<Node>) {
+fn build(triangles: &mut [Pinned], first: usize, nodes: &mut Vec<Node>) {
     if triangles.is_empty() {
         return;
     }
-    let corners = triangles.iter().flatten();
+    let corners = triangles.iter().flat_map(|t| &t.corners);
     let (low, high) =
         corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
     let (at, count) = (nodes.len(), triangles.len());
@@ -116,7 +138,7 @@ fn build(triangles: &mut [[DVec3; 3]], first: usize, nodes: &mut Vec<Node>) {
     if count > LEAF {
         let size = high - low;
         let axis = (0..3).max_by(|a, b| size[*a].total_cmp(&size[*b])).unwrap_or(0);
-        let middle = |t: &[DVec3; 3]| t.iter().map(|p| p[axis]).sum::<f64>();
+        let middle = |t: &Pinned| t.corners.iter().map(|p| p[axis]).sum::<f64>();
         // Stable: triangles of equal middles keep their order.
         triangles.sort_by(|a, b| middle(a).total_cmp(&middle(b)));
         let (left, right) = triangles.split_at_mut(count / 2);
@@ -172,7 +194,7 @@ fn meeting(rod: &Rod, triangle: &[DVec3; 3]) -> Option<Meeting> {
         return None;
     }
     let gap = distance - rod.radius;
-    Some(Meeting { point: q + 0.5 * gap * normal, normal, gap, room: ROOM * rod.radius })
+    Some(Meeting { point: q + 0.5 * gap * normal, normal, gap, room: ROOM * rod.radius, organ: None })
 }
 
 /// Whether a segment goes through a triangle.

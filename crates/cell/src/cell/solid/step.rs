@@ -66,7 +66,11 @@ impl Solids {
         }
         for k in 0..arms.len() {
             if arms[k].is_ideal() {
-                let own = self.force_at(arms, k, arms[k].drive.tip(), false);
+                let tip = arms[k].drive.tip();
+                for meeting in self.still(&arms[k], &arms[k].rods_at(tip)) {
+                    arms[k].state.pressed.add(&meeting, Spring::at(meeting.gap, meeting.room).force());
+                }
+                let own = self.force_at(arms, k, tip, false);
                 arms[k].state.solid.add(own + given[k].force);
             }
         }
@@ -81,14 +85,13 @@ impl Solids {
             super::bed::meet(height, rods, &mut deepest);
             found.extend(deepest.into_iter());
         }
-        // Where the contact of tissue is off, that of pinned tissue is.
-        if !arm.state.contact_disabled {
-            let shaft_only = arm.state.blades_disabled || arm.state.shears.is_some();
-            let felt = |rod: &&Rod| !shaft_only || rod.part == 0;
-            let mut deepest = Deepest::default();
-            self.pinned.meet(&rods.iter().filter(felt).copied().collect::<Vec<_>>(), &mut deepest);
-            found.extend(deepest.into_iter());
-        }
+        // Blades that shear push no tissue.
+        let shaft_only = arm.state.shears.is_some();
+        let felt = |rod: &&Rod| !shaft_only || rod.part == 0;
+        let mut deepest = Deepest::default();
+        let rods: Vec<Rod> = rods.iter().filter(felt).copied().collect();
+        self.pinned.meet(&rods, &self.holes, arm.model.tools.gripper, &mut deepest);
+        found.extend(deepest.into_iter());
         found
     }
 
@@ -180,6 +183,7 @@ impl Solids {
         for ((meeting, other), obstacle) in found.iter().zip(&obstacles) {
             let force = obstacle.force * meeting.normal;
             sum += force;
+            arms[k].state.pressed.add(meeting, obstacle.force);
             if let Some(j) = other {
                 given[*j] += Wrench { force: -force, torque: meeting.point.cross(-force) };
             }

@@ -11,6 +11,7 @@ use crate::hold::Hold;
 use crate::severance::Parting;
 use glam::DVec3;
 use trocar_testing::tube::{self, ONE_END, specimen};
+use trocar_tissue::{Hole, ToolForce};
 
 fn cell() -> Cell {
     let mut scene = tube::scene();
@@ -19,6 +20,13 @@ fn cell() -> Cell {
     scene.task.name = trocar_scene::TaskName::GraspLift;
     scene.task.organ = "tube".to_owned();
     Cell::new(&scene, &specimen(ONE_END), 1).unwrap()
+}
+
+/// A force on the shaft (N).
+fn force_on_shaft(force: f64) -> [ToolForce; 3] {
+    let mut forces = [ToolForce::default(); 3];
+    forces[0].contact.force.x = force;
+    forces
 }
 
 /// One change for each field. A new field does not compile until it is named here.
@@ -35,14 +43,14 @@ fn changes(state: &ArmState, hold: &Hold) -> Vec<(&'static str, ArmState)> {
         jaw_rate: _,
         exchange: _,
         solid: _,
+        pressed: _,
         forces: _,
         scissors: _,
         shears: _,
         bite: _,
         parting: _,
         held: _,
-        contact_disabled: _,
-        blades_disabled: _,
+        pierces: _,
         rcm_peak: _,
         rcm_reported: _,
         standing: _,
@@ -59,6 +67,7 @@ fn changes(state: &ArmState, hold: &Hold) -> Vec<(&'static str, ArmState)> {
         ("guard", changed(&|s| s.guard.end_frame([DVec3::X, DVec3::ZERO], Default::default(), DVec3::Y, 10.0))),
         ("guarded", changed(&|s| s.guarded ^= true)),
         ("solid", changed(&|s| s.solid.add(1e-9 * DVec3::X))),
+        ("pressed", changed(&|s| s.pressed.end_frame(8, [force_on_shaft(1e-9)].into_iter()))),
         ("gripper", changed(&|s| s.gripper.pose.translation.x += 1e-9)),
         ("jaw angle", changed(&|s| s.gripper.jaw_angle += 1e-9)),
         ("design", changed(&|s| s.design = GraspDesign::RestPose)),
@@ -72,8 +81,7 @@ fn changes(state: &ArmState, hold: &Hold) -> Vec<(&'static str, ArmState)> {
         ("parting", changed(&|s| s.parting = Some(Parting::default()))),
         ("standing", changed(&|s| s.standing = 3)),
         ("held", changed(&|s| s.held = Some(Held { organ: 0, s: 0.5, hold: hold.clone(), opening: 0.1 }))),
-        ("contact_disabled", changed(&|s| s.contact_disabled ^= true)),
-        ("blades_disabled", changed(&|s| s.blades_disabled ^= true)),
+        ("pierces", changed(&|s| s.pierces ^= true)),
         ("rcm_peak", changed(&|s| s.rcm_peak += 1e-9)),
         ("rcm_reported", changed(&|s| s.rcm_reported[1] ^= true)),
     ]
@@ -100,8 +108,8 @@ fn hash_and_restore_carry_every_field() {
         change(&mut other);
         other
     };
-    let CellState { world: _, arms: _, waits: _, touch: _, waiting: _, periods: _ } = &saved;
-    others.push(("waits", changed(&|s| s.waits.push(3))));
+    let CellState { world: _, arms: _, watches: _, touch: _, waiting: _, periods: _ } = &saved;
+    others.push(("watches", changed(&|s| s.watches[0].frames_alone += 1)));
     others.push(("touch", changed(&|s| s.touch ^= true)));
     let action = Action { space: ActionSpace::Pivots, numbers: vec![0.0; 5] };
     others.push(("waiting", changed(&|s| s.waiting.0.push_back(None))));
@@ -109,6 +117,9 @@ fn hash_and_restore_carry_every_field() {
     others.push(("periods", changed(&|s| s.periods += 1)));
     cell.step(None).unwrap();
     others.push(("world and drive", cell.save()));
+    cell.restore(&saved).unwrap();
+    cell.world.state.holes.push(Hole { body: 0, tools: vec![0, 1, 2], nodes: vec![1, 2] });
+    others.push(("holes", cell.save()));
     for (field, other) in &others {
         let hash = other.hash();
         assert!(!seen.contains(&hash), "the hash misses {field}");

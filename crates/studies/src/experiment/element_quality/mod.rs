@@ -148,7 +148,7 @@ impl Case<'_> {
             peak_constraint_n: s.attached.then(|| peak_constraint(&made)),
             slipped: d.slipped,
             torn: s.torn > 0,
-            suspensions: [s.disabled_contacts, s.disabled_blades, s.relaxed],
+            warnings: s.warnings,
         })
     }
 }
@@ -185,7 +185,7 @@ mod tests {
                     peak_constraint_n: Some(0.4),
                     slipped: 0,
                     torn: false,
-                    suspensions: [0, 0, 0],
+                    warnings: Warnings::default(),
                 }));
             }
         }

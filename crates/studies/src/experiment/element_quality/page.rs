@@ -2,13 +2,14 @@
 
 use super::result::{ElementQualityResult, ElementQualityRow};
 use crate::Result;
-use crate::experiment::appendix::{Condition, remarks, suspensions};
+use crate::experiment::appendix::{Condition, remarks};
 use crate::trials::resumed;
 use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, or_dash, yes_or_no};
+use trocar_task::Warnings;
 
 pub(super) fn document(r: &ElementQualityResult) -> Result<Document> {
     // Groups of cases: condition, and whether the jaw force is proportional to the modulus.
@@ -44,17 +45,13 @@ fn section(r: &ElementQualityResult, (condition, scaled): (Condition, bool)) -> 
     let diverged = rows.iter().filter(|row| row.diverged).count();
     let held = rows.iter().filter(|row| row.held).count();
     let smallest = rows.iter().map(|row| row.min_volume_ratio).fold(f64::INFINITY, f64::min);
-    let sum = |k: usize| rows.iter().map(|row| row.suspensions[k]).sum();
+    let warnings: Warnings = rows.iter().map(|row| row.warnings).sum();
     let cards = [
         Card::new("Inverted", count(inverted), "largest number in any frame of any case").met(inverted == 0),
         Card::new("Diverged", format!("{diverged} of {}", rows.len()), "cases").met(diverged == 0),
         Card::new("Held", format!("{held} of {}", rows.len()), "cases"),
         Card::new("Smallest volume", fixed(smallest, 3), "of an element over its volume at rest"),
-        Card::new(
-            "Suspensions",
-            suspensions([sum(0), sum(1), sum(2)]),
-            "contacts disabled / contacts of blades disabled / organs relaxed",
-        ),
+        Card::new("Warnings", warnings.to_string(), Warnings::LEGEND),
     ];
     let mut pins: Vec<&str> = rows.iter().map(|row| row.pins.as_str()).collect();
     pins.sort_unstable();
@@ -114,7 +111,7 @@ fn table(rows: &[&ElementQualityRow]) -> Table {
             ("Activation step (mm)", &|r| or_dash(r.activation_step_mm, 2)),
             ("Pull (N)", &|r| or_dash(r.peak_constraint_n, 2)),
             ("Held", &|r| yes_or_no(r.held)),
-            ("Suspensions", &|r| suspensions(r.suspensions)),
+            ("Warnings", &|r| r.warnings.to_string()),
             ("Remarks", &|r| remarks(r.divergence.as_ref(), r.why.as_ref(), (r.slipped, r.torn), None)),
         ],
     )

@@ -3,6 +3,7 @@
 use crate::experiment::appendix::Condition;
 use crate::trials::Resumed;
 use serde::{Deserialize, Serialize};
+use trocar_task::Warnings;
 
 /// One case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,8 +50,8 @@ pub struct ElementQualityRow {
     pub slipped: usize,
     /// Whether the tissue tore out.
     pub torn: bool,
-    /// Suspensions: contacts disabled, contacts of blades disabled, organs relaxed.
-    pub suspensions: [usize; 3],
+    /// What was beyond what tissue bears.
+    pub warnings: Warnings,
 }
 
 /// Figures of the study.

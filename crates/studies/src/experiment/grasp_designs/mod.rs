@@ -181,7 +181,7 @@ fn trial(task: &LiftTrial, made: &Recording) -> GraspTrial {
         peak_constraint_n: peak_constraint(made),
         slipped: d.slipped,
         torn: s.torn > 0,
-        suspensions: [s.disabled_contacts, s.disabled_blades, s.relaxed],
+        warnings: s.warnings,
         lifts: lifted.map(|c| (c.time_s - start, c.task.jaw_lift_mm, c.task.lift_mm)).collect(),
     }
 }

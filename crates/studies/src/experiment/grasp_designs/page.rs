@@ -3,7 +3,7 @@
 
 use super::result::{DESIGNS, GraspDesignRow, GraspDesignsResult, GraspTrial};
 use crate::Result;
-use crate::experiment::appendix::{Condition, remarks, suspensions};
+use crate::experiment::appendix::{Condition, remarks};
 use crate::names::design_name;
 use crate::trials::resumed;
 use trocar_report::colors;
@@ -11,6 +11,7 @@ use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, or_dash, yes_or_no};
+use trocar_task::Warnings;
 
 pub(super) fn document(r: &GraspDesignsResult) -> Result<Document> {
     let mut document = Document::new("Grasp designs", "Four ways to hold the appendix");
@@ -30,8 +31,8 @@ pub(super) fn document(r: &GraspDesignsResult) -> Result<Document> {
                    and activation step: medians over the trials that did not diverge, as in the paper. Snap: \
                    displacement that the grasp prescribes, least and greatest trial, each the greatest of its nodes; \
                    zero by construction for live-pose and compliant, which capture nodes where they are. Activation \
-                   step: largest motion of a node in the first frame of the grasp. Suspensions: contacts disabled / \
-                   contacts of blades disabled / organs relaxed.";
+                   step: largest motion of a node in the first frame of the grasp. Warnings: ";
+    let columns = format!("{columns}{}.", Warnings::LEGEND);
     let appendix = format!(
         "Appendix: {} nodes, {} elements, {} kPa, {} kg/m3; {} mm lift, jaw force {} N.",
         count(r.nodes),
@@ -41,7 +42,7 @@ pub(super) fn document(r: &GraspDesignsResult) -> Result<Document> {
         r.lift_mm,
         r.jaw_force_n
     );
-    let lines = [columns.to_owned(), appendix].into_iter().chain(resumed(&r.resumed, "trials"));
+    let lines = [columns, appendix].into_iter().chain(resumed(&r.resumed, "trials"));
     Ok(document.with(Section::new("Settings", "").lines(lines)).with(trials(r)))
 }
 
@@ -88,7 +89,7 @@ fn table_ii(r: &GraspDesignsResult, condition: Condition) -> Table {
         "Activation step (mm)",
         "Inverted",
         "Smallest volume",
-        "Suspensions",
+        "Warnings",
     ];
     let range = |ends: Option<(f64, f64)>| match ends {
         None => "\u{2013}".to_owned(),
@@ -110,7 +111,7 @@ fn table_ii(r: &GraspDesignsResult, condition: Condition) -> Table {
             ),
             count(row.inverted_peak),
             fixed(row.min_volume_ratio, 2),
-            suspensions(row.suspensions),
+            row.warnings.to_string(),
         ]
     };
     let paper = |row: &GraspDesignRow| {
@@ -212,7 +213,7 @@ fn trials(r: &GraspDesignsResult) -> Section {
             ("Pull (N)", &|t| fixed(t.peak_constraint_n, 2)),
             ("Yielded", &|t| count(t.yielded_substeps)),
             ("Smallest volume", &|t| fixed(t.min_volume_ratio, 2)),
-            ("Suspensions", &|t| suspensions(t.suspensions)),
+            ("Warnings", &|t| t.warnings.to_string()),
             ("Remarks", &|t| remarks(t.divergence.as_ref(), t.why.as_ref(), (t.slipped, t.torn), inverted(t))),
         ],
     );

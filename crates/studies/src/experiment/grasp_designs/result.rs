@@ -6,6 +6,7 @@ use crate::statistics::median;
 use crate::trials::Resumed;
 use serde::{Deserialize, Serialize};
 use trocar_scene::GraspDesignName;
+use trocar_task::Warnings;
 
 /// All designs, in the paper's order.
 pub(super) const DESIGNS: [GraspDesignName; 4] =
@@ -106,8 +107,8 @@ pub struct GraspTrial {
     pub slipped: usize,
     /// Whether the tissue tore out.
     pub torn: bool,
-    /// Suspensions: contacts disabled, contacts of blades disabled, organs relaxed.
-    pub suspensions: [usize; 3],
+    /// What was beyond what tissue bears.
+    pub warnings: Warnings,
     /// Time since the grasp (s), lift of the jaws and of the tissue (mm).
     pub lifts: Vec<(f64, f64, f64)>,
 }
@@ -145,8 +146,8 @@ pub struct GraspDesignRow {
     pub inverted_peak: usize,
     /// Smallest volume of an element over its volume at rest in any trial.
     pub min_volume_ratio: f64,
-    /// Suspensions in all trials: contacts disabled, contacts of blades disabled, organs relaxed.
-    pub suspensions: [usize; 3],
+    /// What was beyond what tissue bears, in all trials.
+    pub warnings: Warnings,
     /// The paper's row.
     pub paper: Option<PaperGrasp>,
 }
@@ -194,7 +195,6 @@ fn row(condition: Condition, design: GraspDesignName, regrasp: bool, trials: &[G
     };
     let most = |value: &dyn Fn(&GraspTrial) -> Option<f64>| values(value).into_iter().reduce(f64::max);
     let snaps = || of.iter().filter_map(|t| t.snap_mm);
-    let sum = |k: usize| of.iter().map(|t| t.suspensions[k]).sum();
     (!of.is_empty()).then(|| GraspDesignRow {
         condition,
         design: format!("{}{name}", if regrasp { "re-grasp, " } else { "" }),
@@ -211,7 +211,7 @@ fn row(condition: Condition, design: GraspDesignName, regrasp: bool, trials: &[G
         follow_ratio_median: median_of(&|t| t.follow_ratio),
         inverted_peak: of.iter().map(|t| t.inverted_peak).max().unwrap_or(0),
         min_volume_ratio: of.iter().map(|t| t.min_volume_ratio).fold(1.0, f64::min),
-        suspensions: [sum(0), sum(1), sum(2)],
+        warnings: of.iter().map(|t| t.warnings).sum(),
         paper: paper(design, regrasp),
     })
 }
@@ -250,7 +250,7 @@ pub(crate) mod tests {
             peak_constraint_n: 0.2,
             slipped: 0,
             torn: false,
-            suspensions: [0, 1, 0],
+            warnings: Warnings { overstretched: 1, ..Warnings::default() },
             lifts: vec![(0.0, 0.0, 0.0), (1.0, 15.0, 15.0 - value)],
         }
     }
@@ -288,7 +288,7 @@ pub(crate) mod tests {
         assert_eq!((live.held, live.trials, live.diverged, live.inverted_peak), (14, 15, 1, 14));
         // The median of 0 to 14 without 1.
         assert!((live.lift_median_mm - (15.0 - 7.5)).abs() < 1e-12, "a diverged trial has no lift");
-        assert_eq!((live.snap_mm, live.snap_least_mm, live.suspensions), (Some(14.0), Some(0.0), [0, 15, 0]));
+        assert_eq!((live.snap_mm, live.snap_least_mm, live.warnings.overstretched), (Some(14.0), Some(0.0), 15));
         assert_eq!(live.paper.map(|p| (p.held, p.diverged)), Some((13, 2)));
         assert_eq!((rows[0].snap_mm, rows[3].paper), (None, None));
         assert_eq!(rows[4].paper.and_then(|p| p.snap_mm), Some((4.3, 17.8)));

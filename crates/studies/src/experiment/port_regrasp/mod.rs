@@ -28,7 +28,7 @@ const THRESHOLD_MM: f64 = 3.0;
 const DESIGNS: [GraspDesignName; 2] = [GraspDesignName::RestPose, GraspDesignName::LivePose];
 
 /// No rule of the cell.
-const NO_RULES: SafetyRules = SafetyRules { force_guard: false, pierce: false, overstretch: false, relax: false };
+const NO_RULES: SafetyRules = SafetyRules { force_guard: false, strain_guard: false };
 
 /// A re-grasp of dragged tissue through arm and port: RCM deviation after rest-pose and live-pose
 /// capture, with and without the safety rules.
@@ -124,7 +124,7 @@ fn regrasp(lift: &LiftTrial, rules: bool, made: &Recording) -> Regrasp {
         steps: rcm_mm.len(),
         steps_over: rcm_mm.iter().filter(|mm| **mm > THRESHOLD_MM).count(),
         rcm_mm,
-        suspensions: [s.disabled_contacts, s.disabled_blades, s.relaxed],
+        warnings: s.warnings,
         divergence: divergence(made),
     }
 }
@@ -156,7 +156,7 @@ mod tests {
             steps: 2,
             steps_over: 1,
             rcm_mm: vec![0.1, 3.5],
-            suspensions: [0, 1, 0],
+            warnings: Warnings { overstretched: 1, ..Warnings::default() },
             divergence: None,
         };
         let rows = vec![row(true, true), row(false, false)];

@@ -2,7 +2,6 @@
 
 use super::result::{PortRegraspResult, Regrasp};
 use crate::Result;
-use crate::experiment::appendix::suspensions;
 use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page;
@@ -62,7 +61,7 @@ fn table(r: &PortRegraspResult) -> Table {
             ("Pull (N)", &|row| fixed(row.pull_n, 2)),
             ("Largest RCM deviation (mm)", &|row| fixed(row.rcm_peak_mm, 3)),
             (over.as_str(), &|row| format!("{} of {}", row.steps_over, row.steps)),
-            ("Suspensions", &|row| suspensions(row.suspensions)),
+            ("Warnings", &|row| row.warnings.to_string()),
             ("Remarks", &|row| match &row.divergence {
                 Some(why) => why.clone(),
                 None if row.grasped_twice => String::new(),

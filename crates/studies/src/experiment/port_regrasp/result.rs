@@ -2,6 +2,7 @@
 
 use crate::trials::Resumed;
 use serde::{Deserialize, Serialize};
+use trocar_task::Warnings;
 
 /// One re-grasp.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -28,8 +29,8 @@ pub struct Regrasp {
     pub steps_over: usize,
     /// Largest deviation of either arm in each (mm).
     pub rcm_mm: Vec<f64>,
-    /// Disabled contacts, disabled contacts of blades, relaxed organs.
-    pub suspensions: [usize; 3],
+    /// What was beyond what tissue bears.
+    pub warnings: Warnings,
     /// Why it diverged.
     pub divergence: Option<String>,
 }

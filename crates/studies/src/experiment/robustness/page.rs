@@ -8,6 +8,7 @@ use trocar_campaign::{Curve, success_by_name, success_over};
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card, Columns};
 use trocar_report::table::{count, fixed};
+use trocar_task::Warnings;
 use trocar_workflow::counted;
 
 pub(super) fn document(r: &RobustnessResult) -> Result<Document> {
@@ -39,7 +40,7 @@ fn names(curve: &Curve) -> Vec<&str> {
 fn outcome(r: &RobustnessResult) -> Section {
     let sum = |of: &dyn Fn(&PolicyOutcome) -> usize| r.rows.iter().flat_map(|row| &row.policies).map(of).sum::<usize>();
     let inverted = r.rows.iter().flat_map(|row| &row.policies).map(|p| p.inverted_peak).max().unwrap_or(0);
-    let suspended = [0, 1, 2].map(|k| sum(&|p| p.suspensions[k]));
+    let warnings: Warnings = r.rows.iter().flat_map(|row| &row.policies).map(|p| p.warnings).sum();
     let cards = [
         Card::new(
             "Passed",
@@ -49,11 +50,7 @@ fn outcome(r: &RobustnessResult) -> Section {
         Card::new("Inverted elements", count(inverted), "largest number in any frame").met(inverted == 0),
         Card::new("Diverged", count(sum(&|p| p.diverged)), "episodes").met(sum(&|p| p.diverged) == 0),
         Card::new("Could not begin", count(sum(&|p| p.refused)), "episodes, such as with a start out of reach"),
-        Card::new(
-            "Suspensions",
-            suspended.map(|n| n.to_string()).join("/"),
-            "contacts disabled / contacts of blades disabled / organs relaxed",
-        ),
+        Card::new("Warnings", warnings.to_string(), Warnings::LEGEND),
     ];
     let lead = format!(
         "Scene {}, ranges of the set {}. Episodes are unseen ones, from number {} on; with all factors together also \
@@ -119,7 +116,7 @@ fn all(r: &RobustnessResult) -> Section {
             ("could not begin", &|(_, p)| count(p.refused)),
             ("diverged", &|(_, p)| count(p.diverged)),
             ("inverted", &|(_, p)| count(p.inverted_peak)),
-            ("suspensions", &|(_, p)| p.suspensions.map(|n| n.to_string()).join("/")),
+            ("warnings", &|(_, p)| p.warnings.to_string()),
             ("why the first did not pass", &|(_, p)| p.why.clone().unwrap_or_default()),
         ],
     );

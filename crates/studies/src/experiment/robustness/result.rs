@@ -4,7 +4,7 @@ use super::condition::{AS_WRITTEN, TOGETHER};
 use crate::trials::Resumed;
 use serde::{Deserialize, Serialize};
 use trocar_campaign::{Bin, Curve, Interval, Share};
-use trocar_task::Summary;
+use trocar_task::{Summary, Warnings};
 
 /// The episodes of a controller at a condition.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -21,8 +21,8 @@ pub struct PolicyOutcome {
     pub diverged: usize,
     /// Largest number of inverted elements in any frame.
     pub inverted_peak: usize,
-    /// Suspensions: contacts disabled, contacts of blades disabled, organs relaxed.
-    pub suspensions: [usize; 3],
+    /// What was beyond what tissue bears.
+    pub warnings: Warnings,
     /// Episodes that could not begin, such as with a start out of reach.
     pub refused: usize,
     /// Why the first episode did not pass.
@@ -41,8 +41,7 @@ impl PolicyOutcome {
         self.passed += usize::from(s.passed);
         self.diverged += usize::from(s.diverged);
         self.inverted_peak = self.inverted_peak.max(s.inverted_peak);
-        let suspended = [s.disabled_contacts, s.disabled_blades, s.relaxed];
-        self.suspensions.iter_mut().zip(suspended).for_each(|(all, own)| *all += own);
+        self.warnings = [self.warnings, s.warnings].into_iter().sum();
         if !s.passed && self.why.is_none() {
             self.why = s.why.clone().or_else(|| s.end.as_ref().map(ToString::to_string));
         }

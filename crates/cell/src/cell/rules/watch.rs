@@ -1,0 +1,51 @@
+//! Looks at the tissue after a frame: warns, and tells the force guard.
+
+use super::strain::SQUEEZED;
+use super::tissue_at_arm::TissueAtArm;
+use super::{fold, overstretch, pierce};
+use crate::cell::Cell;
+use crate::cell::arm::ArmUnit;
+use crate::cell::report::PeriodLog;
+
+/// What is known of an organ from the frames before.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(in crate::cell) struct OrganWatch {
+    /// It was strained beyond what tissue bears, and has not recovered.
+    pub overstretched: bool,
+    /// Frames for which it has been strained without an instrument at it.
+    pub frames_alone: u32,
+}
+
+impl OrganWatch {
+    /// Its bytes, for the hash.
+    pub fn bytes(&self) -> [u8; 5] {
+        let [a, b, c, d] = self.frames_alone.to_le_bytes();
+        [a, b, c, d, u8::from(self.overstretched)]
+    }
+}
+
+impl Cell {
+    /// Looks for instruments in organs and for tissue that is strained too much, after a frame
+    /// whose smallest element has the share `least` of its rest volume. Returns the strain of the
+    /// tissue at each arm, or none of it where the scene has no strain guard.
+    pub(in crate::cell) fn watch_tissue(&mut self, least: f64, log: &mut PeriodLog) -> Vec<TissueAtArm> {
+        let none = vec![TissueAtArm::default(); self.arms.len()];
+        let strained = self.watches.iter().any(|watch| *watch != OrganWatch::default());
+        if least > SQUEEZED && !strained && !self.arms.iter().any(ArmUnit::meets_tissue) {
+            return none;
+        }
+        pierce::warn(&self.world, &mut self.arms, log);
+        let strains = self.edges.strains(&self.world, least);
+        self.watches.resize(strains.len(), OrganWatch::default());
+        for (organ, strain) in strains.iter().enumerate() {
+            let (name, watch) = (self.world.model.bodies()[organ].name(), &mut self.watches[organ]);
+            let arm = overstretch::instrument_at(&self.world, &self.arms, strain, organ);
+            overstretch::warn(arm, strain, name, watch, log);
+            fold::warn(arm, strain, name, watch, log);
+        }
+        if !self.strain_guard {
+            return none;
+        }
+        self.arms.iter().map(|arm| TissueAtArm::of(&self.world, arm, &strains)).collect()
+    }
+}

@@ -1,0 +1,88 @@
+//! Energy, forces and stiffness of a body's tissue, for solvers that add terms of their own: what
+//! `trocar-tissue` builds its lattice solver on.
+
+use crate::Body;
+use crate::element::{Blocks, Wanted};
+use crate::flow::Flow;
+use crate::potential::{Potential, add_blocks};
+use glam::{DMat3, DVec3};
+use trocar_sparse::BlockMatrix;
+
+/// The stiffness of every hexahedron at rest.
+#[derive(Clone, Debug)]
+pub struct RestStiffness {
+    blocks: Vec<Box<Blocks>>,
+}
+
+impl Body {
+    /// Elastic and viscous energy (J) with the nodes at `x` (m); adds its gradient (N).
+    ///
+    /// All work is done on the calling thread.
+    pub fn add_elastic(&self, x: &[DVec3], flow: &Flow, gradient: &mut [DVec3]) -> f64 {
+        let mut energy = 0.0;
+        for (i, hex) in self.lattice().hexahedra().iter().enumerate() {
+            let before = flow.before.get(i).map(|before| (flow, before));
+            let (part, forces) = self.element(i).forces(&self.corners(i, x), before);
+            energy += part;
+            for (node, force) in hex.nodes.iter().zip(&forces) {
+                gradient[*node as usize] += *force;
+            }
+        }
+        energy
+    }
+
+    /// A matrix with a block for each pair of nodes that a hexahedron joins.
+    pub fn stiffness_pattern(&self) -> BlockMatrix {
+        Potential::pattern(self)
+    }
+
+    /// The stiffness of every hexahedron at rest, without viscosity.
+    pub fn rest_stiffness(&self) -> RestStiffness {
+        let rest = self.lattice().nodes();
+        let stiffness = |i| self.element(i).evaluate(&self.corners(i, rest), Wanted::Projected).hessian;
+        let zero = || Box::new([DMat3::ZERO; 36]);
+        let count = self.lattice().hexahedra().len();
+        RestStiffness { blocks: (0..count).map(|i| stiffness(i).unwrap_or_else(zero)).collect() }
+    }
+
+    /// Adds the stiffness at rest turned with each hexahedron at `x` (m), and that of viscosity: an
+    /// approximation that is always positive semidefinite.
+    pub fn add_turned_stiffness(&self, rest: &RestStiffness, x: &[DVec3], flow: &Flow, matrix: &mut BlockMatrix) {
+        for (i, (hex, blocks)) in self.lattice().hexahedra().iter().zip(&rest.blocks).enumerate() {
+            let (element, corners) = (self.element(i), self.corners(i, x));
+            let turn = element.rotation(&corners);
+            let back = turn.transpose();
+            let mut turned = blocks.map(|block| turn * block * back);
+            if !flow.before.is_empty() {
+                element.add_viscous(&corners, flow, &mut turned);
+            }
+            add_blocks(hex.nodes, &turned, &mut |a, b, block| matrix.add(a, b, block));
+        }
+    }
+
+    /// Adds the second derivative at `x` (m), projected to be positive semidefinite at each
+    /// integration point, and that of viscosity.
+    pub fn add_projected_stiffness(&self, x: &[DVec3], flow: &Flow, matrix: &mut BlockMatrix) {
+        for (i, hex) in self.lattice().hexahedra().iter().enumerate() {
+            let (element, corners) = (self.element(i), self.corners(i, x));
+            let Some(mut blocks) = element.evaluate(&corners, Wanted::Projected).hessian else { continue };
+            if !flow.before.is_empty() {
+                element.add_viscous(&corners, flow, &mut blocks);
+            }
+            add_blocks(hex.nodes, &blocks, &mut |a, b, block| matrix.add(a, b, block));
+        }
+    }
+}
+
+impl Flow {
+    /// Begins a step of `h` (s) of a body of shear viscosity `viscosity` (Pa s), whose nodes are at
+    /// `x` (m).
+    pub fn begin(&mut self, body: &Body, viscosity: f64, h: f64, x: &[DVec3]) {
+        self.stiffness = viscosity / h;
+        self.before.clear();
+        if viscosity > 0.0 {
+            let count = body.lattice().hexahedra().len();
+            self.before.extend((0..count).map(|hex| body.element(hex).green(&body.corners(hex, x))));
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! What presses, holds and pulls the vertices of an island in a substep, as terms of its potential
+//! in double precision.
+
+use crate::Body;
+use crate::contact::{Contact, Friction, Pairs};
+use glam::{DMat3, DVec3};
+use trocar_lattice::EmbeddedPoint;
+
+use super::embedding::EmbeddingData;
+
+/// A vertex with its share of a term.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Share {
+    /// The body, by its number in the island.
+    pub member: usize,
+    pub share: f64,
+    pub place: Place,
+}
+
+/// Where a vertex is.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Place {
+    /// It moves with a lattice.
+    Embedded(EmbeddedPoint),
+    /// It does not move (m).
+    Fixed(DVec3),
+}
+
+/// The law of a term.
+#[derive(Clone, Copy, Debug)]
+enum Law {
+    /// A contact, which presses on one side or, where it clamps, on both.
+    Contact { normal: DVec3, point: DVec3, hard: f64, hard_from: f64, friction: Friction },
+    /// A spring in all directions.
+    Spring,
+}
+
+/// One term: a point of the island at a plane or a place.
+#[derive(Clone, Debug)]
+pub(super) struct Term {
+    shares: [Option<Share>; 4],
+    /// Added to the weighted sum of the vertices (m).
+    shift: DVec3,
+    /// Where friction or the spring holds the point (m).
+    place: DVec3,
+    /// (N/m).
+    stiffness: f64,
+    law: Law,
+    /// Limit of friction (N), held between two updates.
+    pub limit: f64,
+}
+
+impl Term {
+    /// A spring of `stiffness` (N/m) from a point to a place (m).
+    pub fn spring(share: Share, place: DVec3, stiffness: f64) -> Self {
+        let shares = [Some(share), None, None, None];
+        Self { shares, shift: DVec3::ZERO, place, stiffness, law: Law::Spring, limit: 0.0 }
+    }
+
+    fn contact(contact: &Contact, shares: [Option<Share>; 4], shift: DVec3) -> Self {
+        let law = Law::Contact {
+            normal: contact.normal.as_dvec3(),
+            point: contact.point.as_dvec3(),
+            hard: f64::from(contact.hardened()),
+            hard_from: f64::from(contact.hard_from),
+            friction: contact.friction,
+        };
+        let (place, stiffness) = (contact.place.as_dvec3(), f64::from(contact.stiffness));
+        Self { shares, shift, place, stiffness, law, limit: 0.0 }
+    }
+
+    /// The shares of the point.
+    pub fn shares(&self) -> impl Iterator<Item = &Share> {
+        self.shares.iter().flatten()
+    }
+
+    /// The point, with the lattices' nodes at `x` (m).
+    fn at(&self, x: &[&[DVec3]]) -> DVec3 {
+        let of = |share: &Share| match &share.place {
+            Place::Embedded(point) => share.share * point.interpolate(x[share.member]),
+            Place::Fixed(place) => share.share * *place,
+        };
+        self.shift + self.shares().map(of).sum::<DVec3>()
+    }
+
+    /// Force along the normal at a height (N), negative where it pushes towards the free side; its
+    /// energy (J) and stiffness (N/m).
+    fn press(&self, height: f64) -> [f64; 3] {
+        let k = self.stiffness;
+        let Law::Contact { hard, hard_from, friction, .. } = self.law else { return [0.0; 3] };
+        if let Friction::Clamped(_) = friction {
+            return [k * height, 0.5 * k * height * height, k];
+        }
+        if height >= 0.0 {
+            return [0.0; 3];
+        }
+        let beyond = (-height - hard_from).max(0.0);
+        let force = k * height - (hard - k) * beyond;
+        let energy = 0.5 * (k * height * height + (hard - k) * beyond * beyond);
+        [force, energy, if beyond > 0.0 { hard } else { k }]
+    }
+
+    /// Sets the limit of friction to that at `x`.
+    pub fn update_limit(&mut self, x: &[&[DVec3]]) {
+        let Law::Contact { normal, point, friction, .. } = self.law else { return };
+        self.limit = match friction {
+            Friction::Coulomb(0.0) => 0.0,
+            Friction::Coulomb(coefficient) => -f64::from(coefficient) * self.press((self.at(x) - point).dot(normal))[0],
+            Friction::Clamped(force) => f64::from(force.max(0.0)),
+        };
+    }
+
+    /// Energy at `x` (J), its gradient by the point (N) and, positive semidefinite, its second
+    /// derivative (N/m). None where nothing acts.
+    fn value(&self, x: &[&[DVec3]]) -> Option<(f64, DVec3, DMat3)> {
+        let p = self.at(x);
+        let Law::Contact { normal, point, .. } = self.law else {
+            let off = p - self.place;
+            let k = self.stiffness;
+            return Some((0.5 * k * off.length_squared(), k * off, DMat3::from_diagonal(DVec3::splat(k))));
+        };
+        let [force, mut energy, along] = self.press((p - point).dot(normal));
+        if along == 0.0 && self.limit <= 0.0 {
+            return None;
+        }
+        let off = p - self.place;
+        let off = off - off.dot(normal) * normal;
+        let pull = self.stiffness * off.length();
+        let across = self.stiffness * if pull > self.limit { self.limit / pull } else { 1.0 };
+        energy += if pull > self.limit {
+            self.limit * (off.length() - 0.5 * self.limit / self.stiffness)
+        } else {
+            0.5 * self.stiffness * off.length_squared()
+        };
+        let outer = DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z);
+        let block = outer * (along - across) + DMat3::from_diagonal(DVec3::splat(across));
+        Some((energy, force * normal + across * off, block))
+    }
+
+    /// Adds the gradient at `x` (N); returns the energy (J).
+    pub fn add_gradient(&self, x: &[&[DVec3]], gradient: &mut [Vec<DVec3>]) -> f64 {
+        let Some((energy, force, _)) = self.value(x) else { return 0.0 };
+        for share in self.shares() {
+            if let Place::Embedded(point) = &share.place {
+                point.spread(share.share * force, &mut gradient[share.member]);
+            }
+        }
+        energy
+    }
+
+    /// Calls `add(a, b, block)` for pairs of nodes of the lattice of a body (N/m). Coupling between
+    /// vertices is left out, and each bears the whole share of its own: no less than the term's
+    /// second derivative where they move alike.
+    pub fn add_stiffness(&self, x: &[&[DVec3]], member: usize, mut add: impl FnMut(u32, u32, DMat3)) {
+        if !self.shares().any(|share| share.member == member) {
+            return;
+        }
+        let Some((_, _, block)) = self.value(x) else { return };
+        for share in self.shares().filter(|share| share.member == member) {
+            if let Place::Embedded(point) = &share.place {
+                for (a, wa) in point.nodes.iter().zip(&point.weights) {
+                    for (b, wb) in point.nodes.iter().zip(&point.weights) {
+                        add(*a, *b, block * (share.share.abs() * wa * wb));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Force of the spring at `x` on what holds the point (N), and the point (m).
+    pub fn pull(&self, x: &[&[DVec3]]) -> (DVec3, DVec3) {
+        let p = self.at(x);
+        (self.stiffness * (p - self.place), p)
+    }
+}
+
+/// A vertex of a body.
+fn share(member: usize, embedding: Option<&EmbeddingData>, x: &[glam::Vec3A], vertex: u32, share: f64) -> Share {
+    let embedded = embedding.and_then(|embedding| embedding.points[vertex as usize]);
+    let place = embedded.map_or_else(|| Place::Fixed(x[vertex as usize].as_dvec3()), Place::Embedded);
+    Share { member, share, place }
+}
+
+/// The body of a member, and where its vertices are.
+pub(super) type Member<'a> = (&'a Body, &'a [glam::Vec3A]);
+
+/// Appends the contacts of a body with tools, supports and grasps.
+pub(super) fn push_contacts(member: usize, (body, x): Member<'_>, contacts: &[Contact], terms: &mut Vec<Term>) {
+    let embedding = body.lattice.as_deref();
+    for contact in contacts {
+        let mut shares = [None; 4];
+        for (to, (vertex, weight)) in shares.iter_mut().zip(contact.site.shares()) {
+            *to = Some(share(member, embedding, x, vertex, f64::from(weight)));
+        }
+        terms.push(Term::contact(contact, shares, DVec3::ZERO));
+    }
+}
+
+/// Appends the contacts between the bodies of an island.
+pub(super) fn push_pairs<'a>(members: impl Fn(usize) -> Member<'a>, pairs: &Pairs, terms: &mut Vec<Term>) {
+    for pair in pairs.list() {
+        let shares = pair.shares().map(|(member, vertex, weight)| {
+            let (body, x) = members(member);
+            (weight != 0.0).then(|| share(member, body.lattice.as_deref(), x, vertex, f64::from(weight)))
+        });
+        terms.push(Term::contact(&pair.contact, shares, pair.shift().as_dvec3()));
+    }
+}
