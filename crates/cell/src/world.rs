@@ -77,7 +77,7 @@ impl Default for Surroundings {
             filtered: Vec::new(),
             bed_friction: Some(SUPPORT_FRICTION),
             floating: Vec::new(),
-            mesh_correction: true,
+            mesh_correction: false,
             toughness: Vec::new(),
         }
     }

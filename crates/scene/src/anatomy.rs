@@ -310,7 +310,7 @@ impl Default for Tissue {
             cell_mm: None,
             law: None,
             schedule: ScheduleName::Fast,
-            mesh_correction: true,
+            mesh_correction: false,
             contact_offset_mm: 1.5,
             tool_contact: ToolContactKind::Surface,
             tip_rest_offset_mm: 1.5,

@@ -40,6 +40,8 @@ pub(super) enum Method {
     Quadratic,
     /// What the cell steps.
     Default,
+    /// Linear tetrahedra of the organ's mesh, softer by what the mesh is too stiff.
+    Corrected,
     /// Linear tetrahedra: the organ's mesh.
     Linear,
     /// The same, each divided into eight.
@@ -75,6 +77,7 @@ impl Trial {
         match self.method {
             Method::Quadratic => by("quadratic", Elements::quadratic(own, material)),
             Method::Default => by("default", Elements::linear(own, default_material(body, material))),
+            Method::Corrected => by("corrected", Elements::linear(own, trocar_cell::element_material(material, own))),
             Method::Linear => by("linear", Elements::linear(own, material)),
             Method::LinearFiner => by("linear", Elements::divided(own, material)),
             Method::LinearCoarser { by: times } => {

@@ -81,7 +81,14 @@ impl MeshConvergenceExperiment {
 
     fn trials(&self, nu: f64) -> Vec<Trial> {
         let coarser = self.coarser.iter().map(|by| Method::LinearCoarser { by: *by });
-        let own = [Method::Quadratic, Method::Default, Method::Linear, Method::LinearFiner, Method::Patches];
+        let own = [
+            Method::Quadratic,
+            Method::Default,
+            Method::Corrected,
+            Method::Linear,
+            Method::LinearFiner,
+            Method::Patches,
+        ];
         let lattices = self.lattice_mm.iter().map(|mm| Method::Lattice { cell: 1e-3 * mm });
         own.into_iter().chain(coarser).chain(lattices).map(|method| Trial { method, nu }).collect()
     }

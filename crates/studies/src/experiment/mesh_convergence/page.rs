@@ -38,6 +38,8 @@ pub(super) fn document(r: &MeshConvergenceResult) -> Result<Document> {
             .met(r.default_sag_error <= MOST_SAG),
         Card::new("Local pull", percent(r.default_pull_error, 1), "greatest error of the default tissue; 15% at most")
             .met(r.default_pull_error <= MOST_PULL),
+        Card::new("Sag, corrected", percent(r.corrected_sag_error, 1), "with mesh_correction"),
+        Card::new("Local pull, corrected", percent(r.corrected_pull_error, 1), "with mesh_correction"),
         Card::new("Lift", percent(r.default_lift_error, 1), "greatest error of the default tissue"),
         Card::new("Grasp-lift", percent(r.default_grasp_error, 1), "greatest error of the default tissue"),
     ];

@@ -22,8 +22,8 @@ pub struct Cases {
 /// The body by one kind and size of elements.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeshRow {
-    /// `quadratic` (the reference), `default` (what the cell steps), `linear`, `patches`,
-    /// `lattice`.
+    /// `quadratic` (the reference), `default` (what the cell steps), `corrected` (with `[tissue]
+    /// mesh_correction`), `linear`, `patches`, `lattice`.
     pub method: String,
     /// Median edge of the mesh, or edge of a lattice's cell (mm).
     pub edge_mm: f64,
@@ -55,7 +55,11 @@ pub struct MeshConvergenceResult {
     pub default_sag_error: f64,
     /// Greatest error of its local pull.
     pub default_pull_error: f64,
-    /// Greatest error of its lift, and of its grasp-lift.
+    /// Greatest error of the sag, and of the local pull, with `[tissue] mesh_correction`.
+    pub corrected_sag_error: f64,
+    /// See `corrected_sag_error`.
+    pub corrected_pull_error: f64,
+    /// Greatest error of the default tissue's lift, and of its grasp-lift.
     pub default_lift_error: f64,
     /// See `default_lift_error`.
     pub default_grasp_error: f64,
@@ -75,13 +79,17 @@ impl MeshConvergenceResult {
     /// From the rows, and the organ's numbers of nodes and elements.
     pub(super) fn from_rows(rows: Vec<MeshRow>, (nodes, tets): (usize, usize), resumed: Resumed) -> Result<Self> {
         let errors = rows.iter().map(|row| errors(row, &rows)).collect::<Result<Vec<_>>>()?;
-        let own = || rows.iter().zip(&errors).filter(|(row, _)| row.method == "default").map(|(_, e)| e);
-        let most = |of: fn(&Errors) -> f64| own().map(|e| of(e).abs()).fold(0.0, f64::max);
+        let most = |method: &str, of: fn(&Errors) -> f64| {
+            let own = rows.iter().zip(&errors).filter(|(row, _)| row.method == method);
+            own.map(|(_, e)| of(e).abs()).fold(0.0, f64::max)
+        };
         Ok(Self {
-            default_sag_error: most(|e| e.sag),
-            default_pull_error: most(|e| e.pull),
-            default_lift_error: most(|e| e.lift),
-            default_grasp_error: most(|e| e.grasp),
+            default_sag_error: most("default", |e| e.sag),
+            default_pull_error: most("default", |e| e.pull),
+            default_lift_error: most("default", |e| e.lift),
+            default_grasp_error: most("default", |e| e.grasp),
+            corrected_sag_error: most("corrected", |e| e.sag),
+            corrected_pull_error: most("corrected", |e| e.pull),
             nodes,
             tets,
             rows,
