@@ -423,10 +423,7 @@ fn a_load_aside_leans_the_shaft_in_its_port() {
     // blades.
     let mut specimen = two_tubes(Pins::Band { share: 0.42 }, 3e-3);
     specimen.organs[0].material.young_modulus_pa = 1e6;
-    // Where a softer tube rolls away under the blades there is no load to lean against.
-    let mut scene = scene();
-    scene.tissue.mesh_correction = false;
-    let mut cell = Cell::new(&scene, &specimen, 1).unwrap();
+    let mut cell = cell(&specimen);
     cell.servo_jaw("left", 0.0).unwrap();
     let beside = DVec3::new(0.0, 0.46 - 0.0105, 0.045);
     let free = over(&cell, "left", beside, -0.006);
