@@ -11,7 +11,7 @@ use trocar_sparse::BlockMatrix;
 /// The stiffness of every hexahedron at rest.
 #[derive(Clone, Debug)]
 pub struct RestStiffness {
-    blocks: Vec<Box<Blocks>>,
+    blocks: Vec<Blocks>,
 }
 
 impl Body {
@@ -40,9 +40,8 @@ impl Body {
     pub fn rest_stiffness(&self) -> RestStiffness {
         let rest = self.lattice().nodes();
         let stiffness = |i| self.element(i).evaluate(&self.corners(i, rest), Wanted::Projected).hessian;
-        let zero = || Box::new([DMat3::ZERO; 36]);
         let count = self.lattice().hexahedra().len();
-        RestStiffness { blocks: (0..count).map(|i| stiffness(i).unwrap_or_else(zero)).collect() }
+        RestStiffness { blocks: (0..count).map(|i| stiffness(i).map_or([DMat3::ZERO; 36], |blocks| *blocks)).collect() }
     }
 
     /// Adds the stiffness at rest turned with each hexahedron at `x` (m), and that of viscosity: an
