@@ -158,6 +158,7 @@ mod tests {
     use super::*;
     use crate::names::design_name;
     use crate::trials::Resumed;
+    use trocar_task::Warnings;
 
     fn made_up_result() -> ElementQualityResult {
         let mut rows = Vec::new();

@@ -15,7 +15,7 @@ const GRASP_STIFFNESS: f64 = 100.0;
 
 /// The row of a lattice with cells of `cell` (m).
 pub(super) fn row(body: &TestBody, tissue: trocar_tissue::Material, cell: f64) -> Result<MeshRow> {
-    let lattice = Lattice::of_mesh(&body.mesh, &LatticeOptions::new(cell)).map_err(refused)?;
+    let lattice = Lattice::of_mesh(&body.mesh, &LatticeOptions::new(cell)).map_err(|error| refused(&error))?;
     let material = Material {
         law: Law::StableNeoHookean,
         young_modulus: tissue.young_modulus,
@@ -69,7 +69,7 @@ impl Trial<'_> {
     fn pulled(&self, hold: Hold, patch: &Patch, force: f64) -> Result<f64> {
         let up = self.body.up;
         let places: Vec<DVec3> = patch.iter().map(|(p, _)| *p).collect();
-        let points = self.lattice.embed(&places).map_err(refused)?;
+        let points = self.lattice.embed(&places).map_err(|error| refused(&error))?;
         let loads = |share: f64| {
             let load = |(point, (_, weight)): (&EmbeddedPoint, &(DVec3, f64))| PointLoad {
                 point: *point,
@@ -86,7 +86,7 @@ impl Trial<'_> {
     fn held(&self, of: impl Fn(DVec3) -> bool) -> Result<Vec<EmbeddedPoint>> {
         let vertices = &self.body.mesh.vertices;
         let nodes: Vec<u32> = (0..vertices.len() as u32).filter(|i| of(vertices[*i as usize])).collect();
-        self.lattice.embed_held(&nodes).map_err(refused)
+        self.lattice.embed_held(&nodes).map_err(|error| refused(&error))
     }
 
     fn settle(
@@ -102,19 +102,19 @@ impl Trial<'_> {
             pins,
             fixed: Vec::new(),
         };
-        let body = Body::new(description).map_err(refused)?;
+        let body = Body::new(description).map_err(|error| refused(&error))?;
         let mut state = BodyState::new(&body);
-        let mut newton = Newton::new(&body, Precision::default()).map_err(refused)?;
+        let mut newton = Newton::new(&body, Precision::default()).map_err(|error| refused(&error))?;
         for part in 1..=GRASP_PARTS {
             let (gravity, springs, loads) = acting(part as f64 / GRASP_PARTS as f64);
             newton
                 .settle(&body, &Conditions { gravity, springs: &springs, loads: &loads }, &mut state)
-                .map_err(refused)?;
+                .map_err(|error| refused(&error))?;
         }
         Ok((body, state))
     }
 }
 
-fn refused(error: trocar_lattice::Error) -> Error {
+fn refused(error: &trocar_lattice::Error) -> Error {
     Error::Mismatch(error.to_string())
 }

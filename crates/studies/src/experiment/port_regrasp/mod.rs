@@ -132,6 +132,7 @@ fn regrasp(lift: &LiftTrial, rules: bool, made: &Recording) -> Regrasp {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use trocar_task::Warnings;
 
     #[test]
     fn every_drag_is_run_with_both_captures_with_and_without_rules() {
