@@ -445,8 +445,8 @@ fn a_load_aside_leans_the_shaft_in_its_port() {
 }
 
 /// A cell of `scene` with tubes, in which the right cutter is open about the middle of the first.
-fn about_the_tube(scene: &Scene) -> Cell {
-    let mut cell = Cell::new(scene, &two_tubes(ONE_END, 2.2e-3), 1).unwrap();
+fn about_the_tube(scene: &Scene, pins: Pins) -> Cell {
+    let mut cell = Cell::new(scene, &two_tubes(pins, 2.2e-3), 1).unwrap();
     let at = DVec3::new(0.005, 0.46, 0.045);
     cell.servo_jaw("right", 1.0).unwrap();
     let above = over(&cell, "right", at, -0.03);
@@ -473,11 +473,19 @@ fn snip(cell: &mut Cell, jaw: f64, periods: usize) -> (Vec<Severance>, f64, f64)
     (cuts, arm.measured.jaw(), arm.jaw_force)
 }
 
+/// Pinned tissue stops blades that turn, but not those that shear it.
+#[test]
+fn scissors_close_through_pinned_tissue() {
+    let mut cell = about_the_tube(&scene(), Pins::Band { share: 0.6 });
+    let (_, jaw, _) = snip(&mut cell, 0.0, 20);
+    assert!(jaw < 0.01, "{jaw} open");
+}
+
 #[test]
 fn scissors_keep_what_they_cut_and_weak_ones_stand() {
     let mut scene = scene();
     scene.task.sever = true;
-    let mut cell = about_the_tube(&scene);
+    let mut cell = about_the_tube(&scene, ONE_END);
     // Half of it, then the rest, for which the work of the first half is not done again.
     let (cuts, jaw, force) = snip(&mut cell, 0.45, 12);
     assert!(cuts.is_empty() && (jaw - 0.45).abs() < 1e-9 && force > 1.0, "{cuts:?}, {force} N");
@@ -492,7 +500,7 @@ fn scissors_keep_what_they_cut_and_weak_ones_stand() {
     assert!(half[0].work_mj > 0.2 * work && (work / (0.3 * area) - 1.0).abs() < 0.1, "{work} mJ for {area} mm2");
     // Two newtons are not enough.
     scene.instruments.iter_mut().for_each(|i| i.jaw_force_n = 2.0);
-    let (cuts, jaw, force) = snip(&mut about_the_tube(&scene), 0.0, 15);
+    let (cuts, jaw, force) = snip(&mut about_the_tube(&scene, ONE_END), 0.0, 15);
     assert!(cuts.is_empty() && jaw > 0.3 && (force - 2.0).abs() < 1e-9, "{force} N, {jaw} open");
 }
 
@@ -501,7 +509,7 @@ fn the_cutter_cuts_what_it_closes_on_and_parts_it_where_the_scene_says_so() {
     for sever in [false, true] {
         let mut scene = scene();
         scene.task.sever = sever;
-        let mut cell = about_the_tube(&scene);
+        let mut cell = about_the_tube(&scene, ONE_END);
         cell.servo_jaw("right", 0.0).unwrap();
         let mut events = Vec::new();
         for _ in 0..45 {

@@ -56,8 +56,11 @@ impl Solids {
     }
 
     /// Whether the axis of a blade of `arm` goes through pinned tissue with the jaws at `angle` (rad).
-    /// What has crossed a surface is not pushed back by it.
+    /// What has crossed a surface is not pushed back by it. Blades that shear go through tissue.
     fn blades_cross(&self, arm: &ArmUnit, angle: f64) -> bool {
+        if arm.state.shears.is_some() {
+            return false;
+        }
         let gripper = Gripper { pose: arm.drive.tip(), jaw_angle: angle };
         let blades: Vec<Rod> = arm.rods_of(&gripper).into_iter().filter(|rod| rod.part != 0).collect();
         self.pinned.is_crossed(&blades, &self.holes, arm.model.tools.gripper)
