@@ -1,11 +1,11 @@
-//! Counts of what was beyond what tissue bears.
+//! Counts of events that real tissue would not survive.
 
 use crate::channels::TaskChannels;
 use serde::{Deserialize, Serialize};
 use std::iter::Sum;
 
-/// What was beyond what tissue bears, in an episode or in many. Physics goes on: the numbers say
-/// how far it is to be believed.
+/// Events that real tissue would not survive, in an episode or in many. Physics goes on. The more
+/// there are, the less the motion is that of tissue.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Warnings {

@@ -1,4 +1,4 @@
-//! Looks at the tissue after a frame: warns, and tells the force guard.
+//! Stage 6: looks at the tissue after a frame: warns, and tells the force guard.
 
 use super::strain::SQUEEZED;
 use super::tissue_at_arm::TissueAtArm;
