@@ -4,10 +4,10 @@ use glam::{DMat3, DVec3};
 
 /// The viscous part of a step of implicit Euler.
 ///
-/// A tissue of shear viscosity eta dissipates eta (2 D:D + tr(D)^2) a volume for a rate of strain D,
-/// as the dashpots of `trocar-tissue` do on an isotropic mesh. The rate is that of Green's strain
-/// over the step, (C - C0)/(2 h) with C = F'F, which no rotation changes. The potential of the step
-/// is h eta (D:D + tr(D)^2/2) a volume.
+/// A tissue of shear viscosity eta dissipates eta (2 D:D + tr(D)^2) a volume for a rate of strain
+/// D, as the dashpots of `trocar-tissue` do on an isotropic mesh. The rate is that of Green's
+/// strain over the step, (C - C0)/(2 h) with C = F'F, which no rotation changes. The potential of
+/// the step is h eta (D:D + tr(D)^2/2) a volume.
 #[derive(Clone, Debug, Default)]
 pub struct Flow {
     /// eta/h (Pa).

@@ -34,13 +34,6 @@ pub struct Hexahedron {
     pub spread: DMat3,
 }
 
-impl Hexahedron {
-    /// Whether the whole cell is material.
-    pub fn is_full(&self) -> bool {
-        self.fraction == 1.0
-    }
-}
-
 /// A regular lattice of hexahedra around a body.
 ///
 /// It is cut from a tetrahedral mesh of the body. Volume, mean and covariance of the material in

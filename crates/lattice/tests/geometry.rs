@@ -65,7 +65,7 @@ fn an_aligned_block_has_full_cells() {
         let lattice = Lattice::of_mesh(&mesh, &LatticeOptions::new(cell)).unwrap();
         assert_eq!(lattice.hexahedra().len(), cells.iter().product::<usize>());
         assert_eq!(lattice.nodes().len(), cells.iter().map(|n| n + 1).product::<usize>());
-        assert!(lattice.hexahedra().iter().all(|hex| hex.is_full()));
+        assert!(lattice.hexahedra().iter().all(|hex| hex.fraction == 1.0));
     }
 }
 

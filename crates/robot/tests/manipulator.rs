@@ -8,7 +8,7 @@ use glam::DVec3;
 use trocar_core::{Pose, Wrench};
 use trocar_robot::chain::Joints;
 use trocar_robot::instrument::Coordinates;
-use trocar_robot::manipulator::{ControllerSettings, Law, Manipulator, ModelError, Obstacle, StepReport};
+use trocar_robot::manipulator::{ControllerSettings, Law, Manipulator, ManipulatorReport, ModelError, Obstacle};
 use trocar_robot::wrench::LoadModel;
 
 const DT: f64 = 1.0 / 480.0;
@@ -17,7 +17,7 @@ fn lag(m: &Manipulator) -> f64 {
     m.measured_cp().translation.distance(m.setpoint_cp().translation)
 }
 
-fn rest(m: &mut Manipulator, load: Wrench, seconds: f64, mut each: impl FnMut(&Manipulator, &StepReport)) {
+fn rest(m: &mut Manipulator, load: Wrench, seconds: f64, mut each: impl FnMut(&Manipulator, &ManipulatorReport)) {
     for _ in 0..(seconds / DT).round() as usize {
         let report = m.step(load, DT).unwrap();
         each(m, &report);
@@ -25,7 +25,7 @@ fn rest(m: &mut Manipulator, load: Wrench, seconds: f64, mut each: impl FnMut(&M
 }
 
 /// Moves the tip around its circle in 4 s.
-fn circle(m: &mut Manipulator, mut each: impl FnMut(&Manipulator, &StepReport)) {
+fn circle(m: &mut Manipulator, mut each: impl FnMut(&Manipulator, &ManipulatorReport)) {
     let start = m.commanded();
     for k in 0..4 * 480 {
         if k % 16 == 0 {

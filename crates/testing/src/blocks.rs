@@ -4,7 +4,8 @@
 use glam::DVec3;
 use trocar_geometry::{LatticeMesher, SignedDistance, TetMesh};
 use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, Descent, Material, Model, ModelBuilder, SolverSettings, Start,
+    BodyDescription, ConstitutiveModel, Descent, Material, Model, ModelBuilder, SolverSettings, Start, SupportField,
+    SupportPlane,
 };
 
 /// Length of a frame (s).
@@ -114,4 +115,25 @@ pub fn appendix(cell: f64) -> TetMesh {
     const RADIUS: f64 = 0.0045;
     let bounds = (DVec3::new(0.0, -RADIUS, -RADIUS), DVec3::new(LENGTH, 0.02, RADIUS));
     LatticeMesher::uniform(cell).mesh_shape(&Tube, bounds).unwrap()
+}
+
+/// Three small bodies: one to be grasped, one dropped on a plane, one on a field; and the
+/// nodes of the first to be grasped.
+pub fn three_bodies() -> (Model, Vec<u32>) {
+    let (large, small) = (block([2, 2, 4], 2e-3), block([2, 1, 1], 2e-3));
+    let mut builder = ModelBuilder::new().gravity(GRAVITY);
+    let material = Material { viscosity: 4.0, ..tissue(12e3) };
+    let pinned = nodes(&large, |p| p.z == 0.0);
+    builder.body(BodyDescription { name: "held".into(), mesh: &large, material, pinned, supports: vec![] }).unwrap();
+    let plane = SupportPlane { point: DVec3::Z * -2e-3, normal: DVec3::Z, friction: 0.6 };
+    let field = SupportField::under(&small, DVec3::new(0.1, 0.0, 1.0), 1e-3, 0.4).unwrap();
+    for (name, model, support) in [
+        ("dropped", ConstitutiveModel::StVenantKirchhoff, plane.into()),
+        ("lying", ConstitutiveModel::Corotated, field.into()),
+    ] {
+        let (material, supports) = (Material { model, ..material }, vec![support]);
+        let body = BodyDescription { name: name.into(), mesh: &small, material, pinned: vec![], supports };
+        builder.body(body).unwrap();
+    }
+    (builder.build().unwrap(), nodes(&large, |p| p.z > 7e-3 && p.x < 3e-3))
 }

@@ -1,6 +1,7 @@
 //! Builds models. Every error of a model is found here.
 
 mod check;
+mod embed;
 
 use crate::assembly::{SEEN_FROM, shape_gradients};
 use crate::body::coloring::color;
@@ -9,11 +10,11 @@ use crate::body::groups::Groups;
 use crate::body::strip::{Push, strip};
 use crate::body::surface::Surface;
 use crate::body::{BodyData, Corner, Edge, Vertex};
-use crate::lattice::Embedding;
 use crate::{
     Backend, Body, BodyContact, Collider, ConstitutiveModel, Error, Material, Model, Result, StableNeoHookean, Support,
     ToolContact,
 };
+pub(crate) use embed::embed;
 use glam::{DVec3, Vec3A};
 use trocar_geometry::{TetMesh, TetQuality};
 
@@ -146,7 +147,7 @@ impl ModelBuilder {
         }
         let mut body = lay_out(body, self.mass_floor, self.contact_stiffness, None);
         if let Backend::Lattice(settings) = self.backend {
-            body.lattice = Embedding::of(&body, settings)?;
+            body.lattice = embed(&body, settings)?;
         }
         self.bodies.push(body);
         Ok(self.bodies.len() - 1)

@@ -1,8 +1,9 @@
 //! Islands: bodies that may touch each other and no others. Each is solved on its own, in parallel.
 
 use crate::body_slot::{BodySlot, Solver};
-use crate::contact::{ContactSet, Coupling, Members, Pairs, Source};
+use crate::contact::{ContactSet, Coupling, Members, Pairs};
 use crate::frame::Frame;
+use crate::state::Source;
 use glam::DVec3;
 use std::cmp::Reverse;
 

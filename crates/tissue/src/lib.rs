@@ -45,10 +45,12 @@
 #![forbid(unsafe_code)]
 
 pub mod assembly;
+mod backend;
 mod body;
 mod body_slot;
 mod builder;
 mod contact;
+mod contact_model;
 mod cutting;
 mod descent;
 mod error;
@@ -75,16 +77,17 @@ mod stepper;
 mod support;
 mod untangle;
 
+pub use backend::{Backend, LatticeSettings, Law};
 pub use body::Body;
 pub use builder::{BodyDescription, MassFloor, ModelBuilder};
-pub use contact::{BodyContact, Collider, Event, Hull, Nearest, Shape, ToolContact, ToolForce};
+pub use contact::{Event, ToolForce};
+pub use contact_model::{BodyContact, Collider, Hull, Nearest, Shape, ToolContact};
 pub use cutting::{Cut, Piece, Severed, sever, sever_part, sides};
 pub use error::{Error, Result};
 pub use external::{BodyFrame, Integrator, Outcome};
 pub use grasp::{Compliance, Grasp, ToolMotion};
 pub use hole::Hole;
 pub use isa::Isa;
-pub use lattice::{Backend, LatticeSettings, Law};
 pub use load::Load;
 pub use material::{ConstitutiveModel, Corotated, Hyperelastic, Material, StVenantKirchhoff, StableNeoHookean};
 pub use model::Model;

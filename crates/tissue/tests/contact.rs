@@ -237,7 +237,8 @@ fn contact_holds_at_any_stiffness() {
     }
 }
 
-/// Contact is the same for any number of threads, when run again, and when continued from the middle.
+/// Contact is the same for any number of threads, when run again, and when continued from the
+/// middle.
 #[test]
 fn contact_repeats_to_the_bit() {
     let mesh = block([6, 4, 3], 2e-3);

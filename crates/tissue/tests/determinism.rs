@@ -4,34 +4,10 @@
 
 use glam::{DQuat, DVec3};
 use trocar_core::Pose;
-use trocar_testing::blocks::{self, FRAME, GRAVITY, block, nodes, tissue};
-use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, Grasp, Material, Model, ModelBuilder, SolverSettings, State, Stepper,
-    SupportField, SupportPlane, ToolMotion,
-};
+use trocar_testing::blocks::{self, FRAME, three_bodies};
+use trocar_tissue::{Grasp, Model, SolverSettings, State, Stepper, ToolMotion};
 
 const FRAMES: usize = 600;
-
-/// Three small bodies: one grasped, one dropped on a plane, one on a field. (A body that several
-/// threads sweep at once is in robustness.rs.)
-fn scene() -> (Model, Vec<u32>) {
-    let (large, small) = (block([2, 2, 4], 2e-3), block([2, 1, 1], 2e-3));
-    let mut builder = ModelBuilder::new().gravity(GRAVITY);
-    let material = Material { viscosity: 4.0, ..tissue(12e3) };
-    let pinned = nodes(&large, |p| p.z == 0.0);
-    builder.body(BodyDescription { name: "held".into(), mesh: &large, material, pinned, supports: vec![] }).unwrap();
-    let plane = SupportPlane { point: DVec3::Z * -2e-3, normal: DVec3::Z, friction: 0.6 };
-    let field = SupportField::under(&small, DVec3::new(0.1, 0.0, 1.0), 1e-3, 0.4).unwrap();
-    for (name, model, support) in [
-        ("dropped", ConstitutiveModel::StVenantKirchhoff, plane.into()),
-        ("lying", ConstitutiveModel::Corotated, field.into()),
-    ] {
-        let (material, supports) = (Material { model, ..material }, vec![support]);
-        let body = BodyDescription { name: name.into(), mesh: &small, material, pinned: vec![], supports };
-        builder.body(body).unwrap();
-    }
-    (builder.build().unwrap(), nodes(&large, |p| p.z > 7e-3 && p.x < 3e-3))
-}
 
 /// A tool that lifts, turns and lowers.
 fn tool(frame: usize) -> Pose {
@@ -56,7 +32,7 @@ fn start(model: &Model, held: &[u32]) -> State {
 }
 
 fn same_bits(schedule: SolverSettings, name: &str) -> u64 {
-    let (model, held) = scene();
+    let (model, held) = three_bodies();
     let whole = |threads: usize| {
         let mut state = start(&model, &held);
         run(&model, &mut Stepper::new(&model, schedule, FRAME, threads).unwrap(), &mut state, 0..FRAMES);

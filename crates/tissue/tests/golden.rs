@@ -10,10 +10,10 @@
 
 use glam::DVec3;
 use trocar_core::Pose;
-use trocar_testing::blocks::{self, FRAME, GRAVITY, block, nodes, tissue};
+use trocar_testing::blocks::{self, FRAME, GRAVITY, block, nodes, three_bodies, tissue};
 use trocar_tissue::{
-    BodyContact, BodyDescription, Collider, Compliance, ConstitutiveModel, Grasp, Load, Material, Model, ModelBuilder,
-    Shape, SolverSettings, State, Stepper, SupportField, SupportPlane, ToolMotion,
+    BodyContact, BodyDescription, Collider, Compliance, Grasp, Load, Material, Model, ModelBuilder, Shape,
+    SolverSettings, State, Stepper, SupportField, SupportPlane, ToolMotion,
 };
 
 fn at(translation: DVec3) -> Pose {
@@ -59,22 +59,7 @@ fn check(scene: &str, found: [u64; 3], golden: [u64; 3]) {
 /// One body held by a tool, one that falls on a plane, one that lies on a field.
 #[test]
 fn rigid_grasp_and_supports() {
-    let (large, small) = (block([2, 2, 4], 2e-3), block([2, 1, 1], 2e-3));
-    let mut builder = ModelBuilder::new().gravity(GRAVITY);
-    let material = Material { viscosity: 4.0, ..tissue(12e3) };
-    let pinned = nodes(&large, |p| p.z == 0.0);
-    builder.body(BodyDescription { name: "held".into(), mesh: &large, material, pinned, supports: vec![] }).unwrap();
-    let plane = SupportPlane { point: DVec3::Z * -2e-3, normal: DVec3::Z, friction: 0.6 };
-    let field = SupportField::under(&small, DVec3::new(0.1, 0.0, 1.0), 1e-3, 0.4).unwrap();
-    for (name, model, support) in [
-        ("falls", ConstitutiveModel::StVenantKirchhoff, plane.into()),
-        ("lies", ConstitutiveModel::Corotated, field.into()),
-    ] {
-        let (material, supports) = (Material { model, ..material }, vec![support]);
-        builder.body(BodyDescription { name: name.into(), mesh: &small, material, pinned: vec![], supports }).unwrap();
-    }
-    let model = builder.build().unwrap();
-    let held = nodes(&large, |p| p.z > 7e-3 && p.x < 3e-3);
+    let (model, held) = three_bodies();
     let mut state = State::new(&model);
     state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY));
     let tools = |k: usize| vec![at(DVec3::new(1e-3, 0.0, 5e-3) * bump(k, 60))];

@@ -163,8 +163,8 @@ fn it_repeats_to_the_bit() {
     assert_eq!(run(1, false), run(1, true));
 }
 
-/// Force of the block on two equal rods that come 1 mm into its top, 18 mm apart (N), when the first
-/// is in a hole.
+/// Force of the block on two equal rods that come 1 mm into its top, 18 mm apart (N), when the
+/// first is in a hole.
 fn forces_at_a_hole(schedule: SolverSettings, hole: bool) -> [f64; 2] {
     let mesh = block([6, 6, 3], 6e-3);
     let mut builder = ModelBuilder::new().gravity(GRAVITY).tool_contact(ToolContact::Surface);

@@ -105,7 +105,7 @@ pub struct Commanded {
 
 /// Result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepReport {
+pub struct ManipulatorReport {
     /// Report of the arm: torques, joints at limits.
     pub arm: chain::ArmStepReport,
     /// Normal force of the shaft on the rim (N), summed over contacts, mean over the step.
@@ -117,7 +117,7 @@ pub struct StepReport {
     pub pace: f64,
 }
 
-impl StepReport {
+impl ManipulatorReport {
     /// Joints that a position limit stopped.
     pub fn stopped(&self) -> JointSet {
         self.arm.at_position_limit
@@ -260,7 +260,7 @@ impl Manipulator {
     /// # Errors
     /// A step outside (0, 20] ms, a load that is not finite, or one so large that the result is not
     /// finite. The state is then unchanged.
-    pub fn step(&mut self, load: Wrench, dt: f64) -> Result<StepReport> {
+    pub fn step(&mut self, load: Wrench, dt: f64) -> Result<ManipulatorReport> {
         self.step_among(load, &mut [], dt)
     }
 
@@ -270,7 +270,7 @@ impl Manipulator {
     /// # Errors
     /// As [`step`](Self::step); more than [`MAX_OBSTACLES`](super::MAX_OBSTACLES) obstacles, or an
     /// invalid one. State and obstacles are then unchanged.
-    pub fn step_among(&mut self, load: Wrench, obstacles: &mut [Obstacle], dt: f64) -> Result<StepReport> {
+    pub fn step_among(&mut self, load: Wrench, obstacles: &mut [Obstacle], dt: f64) -> Result<ManipulatorReport> {
         if !(dt > 0.0 && dt <= MAX_STEP) {
             return Err(Error::invalid("step", format!("is {dt} s; it must be in (0, {MAX_STEP}] s")));
         }
@@ -322,7 +322,7 @@ impl Manipulator {
             obstacle.force = coupling.force;
         }
         let pace = next.reference.pace;
-        Ok(StepReport { arm: report, rim_force, rcm_deviation: self.deviation(&frames), pace })
+        Ok(ManipulatorReport { arm: report, rim_force, rcm_deviation: self.deviation(&frames), pace })
     }
 
     /// A snapshot of the state.

@@ -25,7 +25,7 @@ mod restart;
 mod settings;
 mod touch;
 
-pub use controlled_arm::{Commanded, Manipulator, ManipulatorState, StepReport};
+pub use controlled_arm::{Commanded, Manipulator, ManipulatorReport, ManipulatorState};
 pub use measure::JointReadings;
 pub use obstacle::{MAX_OBSTACLES, Obstacle};
 pub use settings::{ControllerSettings, Gains, Law, ModelError};

@@ -1,9 +1,6 @@
 //! Solid obstacles that an instrument presses on in a step: other instruments, the bed, tissue that
 //! does not move.
 
-use super::controlled_arm::Manipulator;
-use super::touch::Touches;
-use crate::chain::{Coupling, CouplingLaw, Frames};
 use crate::{Error, Result};
 use glam::DVec3;
 
@@ -37,7 +34,8 @@ pub struct Obstacle {
 }
 
 impl Obstacle {
-    fn check(&self, k: usize) -> Result<()> {
+    /// Checks obstacle number `k` of a step.
+    pub(super) fn check(&self, k: usize) -> Result<()> {
         let Self { point, normal, gap, stiffness, damping, speed, force: _ } = *self;
         let numbers = [gap, stiffness, damping, speed];
         if !(point.is_finite() && normal.is_finite() && numbers.iter().all(|n| n.is_finite())) {
@@ -51,35 +49,5 @@ impl Obstacle {
             return wrong("its stiffness must be positive, its damping not negative");
         }
         Ok(())
-    }
-}
-
-impl Manipulator {
-    /// Adds `obstacles` to the couplings of a step of `dt` (s).
-    pub(super) fn meet(&self, obstacles: &[Obstacle], frames: &Frames, touches: &mut Touches, dt: f64) -> Result<()> {
-        if obstacles.len() > MAX_OBSTACLES {
-            let reason = format!("there are {}; the maximum is {MAX_OBSTACLES}", obstacles.len());
-            return Err(Error::invalid("obstacles", reason));
-        }
-        for (k, o) in obstacles.iter().enumerate() {
-            o.check(k)?;
-            // The obstacle's own motion in the step shortens the gap from the beginning; its speed
-            // is taken off the damper's.
-            let displacement = o.gap - o.speed * (dt + o.damping / o.stiffness);
-            let row = frames.jacobian(self.arm.dof(), o.point).row(o.normal);
-            let coupling = Coupling::new(row, displacement, o.stiffness, CouplingLaw::Push);
-            touches.add(Coupling { damping: o.damping, ..coupling }, (o.point, o.normal));
-        }
-        Ok(())
-    }
-
-    /// The mass (kg) that a force at `point` (m) of the instrument along the unit vector
-    /// `direction` accelerates, in the cell: 1 / (J M^-1 J^T) with the arm's mass matrix M and the
-    /// row J of the point's Jacobian (Khatib 1987). Infinite if the arm cannot move that way.
-    pub fn reflected_mass(&self, point: DVec3, direction: DVec3) -> f64 {
-        let q = &self.state.arm.q;
-        let row = self.arm.frames(q).jacobian(self.arm.dof(), point).row(direction);
-        let given = self.arm.mass_matrix(q).factor().map_or(0.0, |factor| row.dot(&factor.solve(&row)));
-        if given > 0.0 { given.recip() } else { f64::INFINITY }
     }
 }

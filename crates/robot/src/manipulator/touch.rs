@@ -1,8 +1,11 @@
-//! Contacts of the instrument, as couplings for the arm's step: between shaft and rim here.
+//! Contacts of the instrument, as couplings for the arm's step: of the shaft with the rim, and of
+//! any point with solid obstacles.
 
 use super::controlled_arm::Manipulator;
+use super::obstacle::{MAX_OBSTACLES, Obstacle};
 use crate::chain::{ArmState, Coupling, CouplingLaw, Frames, MAX_COUPLINGS};
 use crate::port::{Shaft, Twist};
+use crate::{Error, Result};
 use glam::DVec3;
 
 /// Maximum gap at which the shaft may touch the rim within a step (m).
@@ -45,6 +48,34 @@ impl Manipulator {
             );
         }
         touches
+    }
+
+    /// Adds `obstacles` to the couplings of a step of `dt` (s).
+    pub(super) fn meet(&self, obstacles: &[Obstacle], frames: &Frames, touches: &mut Touches, dt: f64) -> Result<()> {
+        if obstacles.len() > MAX_OBSTACLES {
+            let reason = format!("there are {}; the maximum is {MAX_OBSTACLES}", obstacles.len());
+            return Err(Error::invalid("obstacles", reason));
+        }
+        for (k, o) in obstacles.iter().enumerate() {
+            o.check(k)?;
+            // The obstacle's own motion in the step shortens the gap from the beginning; its speed
+            // is taken off the damper's.
+            let displacement = o.gap - o.speed * (dt + o.damping / o.stiffness);
+            let row = frames.jacobian(self.arm.dof(), o.point).row(o.normal);
+            let coupling = Coupling::new(row, displacement, o.stiffness, CouplingLaw::Push);
+            touches.add(Coupling { damping: o.damping, ..coupling }, (o.point, o.normal));
+        }
+        Ok(())
+    }
+
+    /// The mass (kg) that a force at `point` (m) of the instrument along the unit vector
+    /// `direction` accelerates, in the cell: 1 / (J M^-1 J^T) with the arm's mass matrix M and the
+    /// row J of the point's Jacobian (Khatib 1987). Infinite if the arm cannot move that way.
+    pub fn reflected_mass(&self, point: DVec3, direction: DVec3) -> f64 {
+        let q = &self.state.arm.q;
+        let row = self.arm.frames(q).jacobian(self.arm.dof(), point).row(direction);
+        let given = self.arm.mass_matrix(q).factor().map_or(0.0, |factor| row.dot(&factor.solve(&row)));
+        if given > 0.0 { given.recip() } else { f64::INFINITY }
     }
 }
 

@@ -34,7 +34,8 @@ pub struct RimState {
 impl RimState {
     /// Every number of it.
     pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> {
-        self.marks.iter().flat_map(|mark| match mark {
+        let Self { marks } = self;
+        marks.iter().flat_map(|mark| match mark {
             Some(Mark { inner, angle, along }) => [1.0, f64::from(u8::from(*inner)), *angle, *along],
             None => [0.0; 4],
         })

@@ -42,11 +42,6 @@ pub struct Identification {
 }
 
 impl Identification {
-    /// Covariance of the parameters in the order of [`PARAMETERS`] (SI units).
-    pub fn covariance(&self) -> [[f64; PARAMETERS]; PARAMETERS] {
-        self.covariance
-    }
-
     /// Standard deviations of the parameters.
     pub fn deviations(&self) -> LoadModel {
         LoadModel::from_array(std::array::from_fn(|i| self.covariance[i][i].max(0.0).sqrt()))

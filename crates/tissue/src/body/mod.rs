@@ -7,15 +7,16 @@
 
 pub(crate) mod coloring;
 pub(crate) mod element_lanes;
+mod embedding;
 pub(crate) mod groups;
 pub(crate) mod strip;
 pub(crate) mod surface;
 pub(crate) mod tree;
 mod vertex;
 
-use crate::lattice::Embedding;
 use crate::{LatticeSettings, Material, Support};
 use element_lanes::ElementLanes;
+pub(crate) use embedding::{Embedding, EmbeddingData};
 use glam::{DVec3, Vec3A};
 use groups::Groups;
 use std::ops::{Deref, DerefMut};

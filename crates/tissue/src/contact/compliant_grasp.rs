@@ -1,9 +1,9 @@
 //! Nodes that hang compliantly on tools.
 
 use super::contact::{Contact, Friction};
-use super::memory::Source;
 use super::site::Site;
 use crate::frame::Frame;
+use crate::state::Source;
 use crate::{Body, Grasp};
 use glam::Vec3A;
 

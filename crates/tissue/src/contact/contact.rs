@@ -8,8 +8,8 @@
 //! follows ([`Contact::slide`]). A load below the limit is borne at a fixed displacement; nothing
 //! creeps.
 
-use super::memory::Source;
 use super::site::Site;
+use crate::state::Source;
 use glam::{Mat3A, Vec3A};
 
 /// A point of the surface at a plane.
@@ -122,8 +122,8 @@ impl Contact {
         Some(Push { gradient: force * self.normal + across * off, along, across })
     }
 
-    /// The same contact as one of a `vertex` of the site alone, which bears a `share` of it, while the
-    /// others stay where they are; each vertex at `x`.
+    /// The same contact as one of a `vertex` of the site alone, which bears a `share` of it, while
+    /// the others stay where they are; each vertex at `x`.
     pub fn of_vertex(&self, vertex: u32, share: f32, x: impl Fn(u32) -> Vec3A) -> Self {
         let (here, at) = (x(vertex), self.site.at(&x));
         Self {

@@ -9,14 +9,12 @@ use super::contact::{Contact, Friction};
 use super::feature_contacts::FeatureContacts;
 use super::force::ToolForce;
 use super::hole_vertices::HoleVertices;
-use super::memory::{Anchor, Source};
+use super::local_support::LocalSupport;
 use super::site::Site;
-use super::tool_contact::ToolContact;
 use super::tool_placement::{self, Placed};
-use crate::Body;
 use crate::frame::Frame;
-use crate::state::BodyState;
-use crate::support::LocalSupport;
+use crate::state::{Anchor, BodyState, Source};
+use crate::{Body, ToolContact};
 use glam::Vec3A;
 use trocar_core::Wrench;
 

@@ -15,14 +15,12 @@
 use super::contact::{Contact, Friction};
 use super::force::ToolForce;
 use super::hole_vertices::HoleVertices;
-use super::memory::{FeatureAnchor, Source};
-use super::shape::Shape;
 use super::site::Site;
-use super::tool_features::{self, Feature, FeatureKey};
+use super::tool_features::{self, Feature};
 use super::tool_placement::Placed;
-use crate::Body;
 use crate::frame::Frame;
-use crate::state::BodyState;
+use crate::state::{BodyState, FeatureAnchor, FeatureKey, Source};
+use crate::{Body, Shape};
 use glam::{DVec3, Vec3A};
 use trocar_core::Wrench;
 

@@ -10,10 +10,10 @@
 use super::contact::{Contact, Friction, Push};
 use super::coupling::Coupling;
 use super::members::Members;
-use super::memory::{Source, Stretch};
 use super::site::Site;
 use crate::Body;
 use crate::frame::Frame;
+use crate::state::{Source, Stretch};
 use glam::Vec3A;
 
 /// Pairs are left out of a substep if their gap exceeds the gap of contact by more than twice their

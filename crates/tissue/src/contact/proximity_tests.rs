@@ -2,9 +2,8 @@
 //! against exact convex shapes.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic; the timing is printed")]
 
-use super::hull::Hull;
 use super::proximity::{Limits, Near, Proximity};
-use crate::{BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, State};
+use crate::{BodyDescription, ConstitutiveModel, Hull, Material, Model, ModelBuilder, State};
 use glam::{DQuat, DVec3};
 use std::path::Path;
 use std::time::Instant;

@@ -8,11 +8,12 @@
 //!
 //! A pair counts where its distance is a minimum, whether or not another pair is nearer: a rod that
 //! lies flat touches at both its ends. An edge counts if the axis is outside of it, towards neither
-//! of its triangles. In a shallow valley it counts too ([`VALLEY`]), because what presses on an edge
-//! makes one.
+//! of its triangles. In a shallow valley it counts too ([`VALLEY`]), because what presses on an
+//! edge makes one.
 
 use super::site::Site;
 use crate::body::surface::{Surface, foot};
+use crate::state::FeatureKey;
 use glam::Vec3A;
 use trocar_geometry::nearest_of_segments;
 
@@ -22,10 +23,6 @@ const MIN_DISTANCE: f32 = 1e-6;
 /// Sine of the greatest angle by which the axis is towards a triangle of an edge.
 const VALLEY: f32 = 0.5;
 
-/// A feature's name: its vertices, ascending, but that an edge repeats the first at the end; and the
-/// end of the axis that a triangle meets, 0 for an edge.
-pub(crate) type FeatureKey = ([u32; 3], u8);
-
 /// A point of an edge or of a triangle's inside that is near an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Feature {
@@ -34,7 +31,8 @@ pub(super) struct Feature {
 }
 
 impl Feature {
-    /// The feature's site where its vertices are at `x`; None if it is not nearest to the axis there.
+    /// The feature's site where its vertices are at `x`; None if it is not nearest to the axis
+    /// there.
     pub fn moved(&self, x: impl Fn(u32) -> Vec3A, axis: [Vec3A; 2]) -> Option<Site> {
         let vertices = self.site.vertices;
         let inside = |share: &f32| *share > 0.0 && *share < 1.0;
@@ -65,7 +63,8 @@ pub(super) fn find(
     for t in triangles {
         let mut vertices = surface.triangles[*t as usize];
         for k in 0..3 {
-            // The two triangles of an edge run along it in opposite directions, so one of them has it.
+            // The two triangles of an edge run along it in opposite directions, so one of them has
+            // it.
             let edge = [vertices[k], vertices[(k + 1) % 3]];
             if edge[0] < edge[1] {
                 features.extend(of_edge(surface, x, edge, axis, reach));

@@ -1,6 +1,6 @@
 //! Tools that move together, as a body sees them.
 
-use super::memory::Source;
+use crate::state::Source;
 use crate::{Collider, Grasp};
 use glam::DVec3;
 

@@ -11,7 +11,7 @@ const LEAST_SLIP: f32 = 1e-7;
 
 /// A contact that slides by more than this share of a tool's size in a substep has no predicted
 /// plane.
-const LONGEST_SLIP: f32 = 0.3;
+const MAX_SLIP_SHARE: f32 = 0.3;
 
 /// Cosine of the greatest angle between the predicted plane and the present one. Beyond it, the
 /// predicted point is on another side of the tool.
@@ -59,11 +59,12 @@ impl Placed {
         }
     }
 
-    /// Normal and point of the plane at the substep's end, in the frame of `body`, of a place that is
-    /// at `p` in the tool's frame and is expected `there` ([`Self::beside`]).
+    /// Normal and point of the plane at the substep's end, in the frame of `body`, of a place that
+    /// is at `p` in the tool's frame and is expected `there` ([`Self::beside`]).
     ///
-    /// The plane of the present point is wrong for what slides: on a tool of 3 mm that is dragged at
-    /// 6 mm/s it is off by one degree, and a sixtieth of the normal force acts along the surface.
+    /// The plane of the present point is wrong for what slides: on a tool of 3 mm that is dragged
+    /// at 6 mm/s it is off by one degree, and a sixtieth of the normal force acts along the
+    /// surface.
     pub fn plane(&self, collider: &Collider, body: &Body, p: DVec3, there: Vec3A) -> (Vec3A, Vec3A) {
         let here = collider.shape.nearest(p);
         let ahead = self.from.transform(body.origin + there.as_dvec3());
@@ -75,14 +76,14 @@ impl Placed {
         ((self.to.rotation * nearest.normal).as_vec3a(), point.as_vec3a())
     }
 
-    /// Where a vertex at `x` that goes by `way` (m) will be beside the collider at the substep's end,
-    /// moved back with the tool to the beginning; in the frame of `body`. None where it sticks, or
-    /// goes too far to be trusted.
+    /// Where a vertex at `x` that goes by `way` (m) will be beside the collider at the substep's
+    /// end, moved back with the tool to the beginning; in the frame of `body`. None where it
+    /// sticks, or goes too far to be trusted.
     pub fn beside(&self, body: &Body, x: Vec3A, way: Vec3A) -> Option<Vec3A> {
         let end = self.to.inverse().transform(body.origin + (x + way).as_dvec3());
         let ahead = (self.from.inverse().transform(end) - body.origin).as_vec3a();
         let slip = (ahead - x).length_squared();
-        let most = LONGEST_SLIP * self.radius;
+        let most = MAX_SLIP_SHARE * self.radius;
         (slip > LEAST_SLIP * LEAST_SLIP && slip < most * most).then_some(ahead)
     }
 

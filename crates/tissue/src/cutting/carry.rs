@@ -2,10 +2,8 @@
 
 use super::split::{Split, parts};
 use super::{Piece, Severed};
-use crate::builder::{Inherited, lay_out};
-use crate::contact::Anchor;
-use crate::lattice::Embedding;
-use crate::state::{BodyState, WarmStart};
+use crate::builder::{Inherited, embed, lay_out};
+use crate::state::{Anchor, BodyState, WarmStart};
 use crate::{Backend, Body, BodyDescription, Compliance, Grasp, Hole, MassFloor, Model, Result, State};
 use trocar_geometry::TetMesh;
 
@@ -51,7 +49,7 @@ pub(super) fn carry(model: &Model, state: &State, index: usize, split: &Split) -
         let description = BodyDescription { name, mesh: &mesh, material, pinned, supports };
         let mut body = lay_out(description, MassFloor::None, whole.contact_stiffness, Some(inherited));
         if let Backend::Lattice(settings) = model.backend {
-            body.lattice = Embedding::of(&body, settings)?;
+            body.lattice = embed(&body, settings)?;
         }
         let mut motion = motion(whole, &state.bodies[index], &body, &nodes);
         if let (Some(lattice), Some(before), Some(state)) =

@@ -135,8 +135,8 @@ pub fn sever(model: &Model, state: &State, cut: &Cut) -> Result<Severed> {
     sever_part(model, state, cut, [f64::NEG_INFINITY, f64::INFINITY], &sides)
 }
 
-/// For each element of the body that `cut` is to sever, whether it comes to lie on the side that the
-/// normal points to.
+/// For each element of the body that `cut` is to sever, whether it comes to lie on the side that
+/// the normal points to.
 ///
 /// # Errors
 /// As [`sever`].

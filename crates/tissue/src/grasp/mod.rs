@@ -5,10 +5,8 @@
 //! map in a form that is exact to the bit at activation (no snap):
 //! `x_i(t_a) + (R R(t_a)' - I)(x_i(t_a) - p(t_a)) + (p - p(t_a))`.
 
-mod capture;
 mod hash;
 mod tool_motion;
-mod update;
 
 use glam::{DVec3, Vec3A};
 pub use tool_motion::ToolMotion;

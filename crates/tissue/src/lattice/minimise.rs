@@ -1,10 +1,11 @@
-//! One minimisation: L-BFGS over the lattices of an island, preconditioned by a factor of each body.
+//! One minimisation: L-BFGS over the lattices of an island, preconditioned by a factor of each
+//! body.
 //!
 //! The factor is that of the stiffness at rest, turned with each hexahedron, with inertia,
-//! viscosity, pins, contacts and grasps as they are when it is made. It is made once in a frame, and
-//! only for bodies whose forces are not in balance. Where the search needs many steps, it is made
-//! again from the projected second derivative. Everything is in double precision and in a fixed
-//! order: the bits depend on nothing but the states at the frame's beginning.
+//! viscosity, pins, contacts and grasps as they are when it is made. It is made once in a frame,
+//! and only for bodies whose forces are not in balance. Where the search needs many steps, it is
+//! made again from the projected second derivative. Everything is in double precision and in a
+//! fixed order: the bits depend on nothing but the states at the frame's beginning.
 
 use super::system::{Elastic, Lattice};
 use super::terms::Term;

@@ -6,14 +6,9 @@
 //! forces on q are W' f. Pins and rigidly held vertices are stiff springs on x. Elasticity, inertia
 //! and viscosity are those of the lattice.
 
-mod embedding;
 mod minimise;
-mod settings;
 mod system;
 mod terms;
-
-pub(crate) use embedding::Embedding;
-pub use settings::{Backend, LatticeSettings, Law};
 
 use crate::body_slot::{BodySlot, IslandFrame, Solver};
 use crate::contact::ContactSet;
@@ -95,8 +90,8 @@ impl Solver for LatticeSolver {
                 state.stretches.clear();
             }
             state.repair = Repair::default();
-            if let Some(embedding) = &body.lattice {
-                embedding.follow(state);
+            if let (Some(embedding), Some(lattice)) = (&body.lattice, &mut state.lattice) {
+                embedding.follow(lattice, &mut state.x, &mut state.v);
             }
             if let Some(system) = &mut solver.system {
                 system.forget_factor();

@@ -1,8 +1,8 @@
 //! The potential of one lattice in a substep without its contacts, and the factor that
 //! preconditions it.
 
-use super::embedding::{Embedding, EmbeddingData};
 use super::terms::Term;
+use crate::body::{Embedding, EmbeddingData};
 use glam::{DMat3, DVec3};
 use trocar_lattice::Flow;
 use trocar_sparse::{BlockMatrix, Cholesky, Level};

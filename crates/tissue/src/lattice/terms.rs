@@ -2,11 +2,10 @@
 //! in double precision.
 
 use crate::Body;
+use crate::body::EmbeddingData;
 use crate::contact::{Contact, Friction, Pairs};
 use glam::{DMat3, DVec3};
 use trocar_lattice::EmbeddedPoint;
-
-use super::embedding::EmbeddingData;
 
 /// A vertex with its share of a term.
 #[derive(Clone, Copy, Debug)]

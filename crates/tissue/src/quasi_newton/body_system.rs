@@ -7,12 +7,13 @@ use super::layout::Layout;
 use super::rigid_modes::RigidModes;
 use super::sleep::{RestCache, Sleep};
 use super::system::System;
-use crate::contact::{ContactSet, Source};
+use crate::contact::ContactSet;
 use crate::descent::BodyDescent;
 use crate::frame::Frame;
 use crate::lanes::{Row, dot_rows};
 use crate::settings::{Descent, QuasiNewton, Start};
 use crate::state::BodyState;
+use crate::state::Source;
 use crate::{Body, Isa};
 use fearless_simd::{Level, Simd, SimdBase, dispatch, f32x4};
 use glam::Vec3A;
@@ -235,8 +236,8 @@ impl QuasiNewtonSolver {
         self.system.update_warp(self.level, &self.layout, &self.iterate.x);
     }
 
-    /// Updates the system for the elements that are squeezed where the nodes are. The contacts are to
-    /// be updated after it.
+    /// Updates the system for the elements that are squeezed where the nodes are. The contacts are
+    /// to be updated after it.
     pub fn update_squeezed(&mut self) {
         let Self { level, system, layout, elements, held, iterate, .. } = self;
         system.update_squeezed(*level, layout, elements, held, &iterate.x);

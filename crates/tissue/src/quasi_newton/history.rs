@@ -21,9 +21,9 @@ pub(crate) struct History {
     /// Pairs in use; the newest is that of this number.
     pub count: usize,
     pub newest: usize,
-    /// The preconditioner's solutions are taken times this, as in Nocedal and Wright 2006, "Numerical
-    /// Optimization", equation 7.20, but learned from the line search, which needs no other solve:
-    /// the matrix at rest is too soft for squeezed and pressed tissue.
+    /// The preconditioner's solutions are taken times this, as in Nocedal and Wright 2006,
+    /// "Numerical Optimization", equation 7.20, but learned from the line search, which needs no
+    /// other solve: the matrix at rest is too soft for squeezed and pressed tissue.
     pub scale: f32,
     /// 1 / (step . change) of each pair.
     pub inverses: Vec<f32>,
@@ -104,8 +104,8 @@ impl History {
         std::mem::take(&mut self.count) > 0
     }
 
-    /// Learns which share of a direction would have been `best`. What the pairs know already has the
-    /// right length, so it is the rest that was too long or too short.
+    /// Learns which share of a direction would have been `best`. What the pairs know already has
+    /// the right length, so it is the rest that was too long or too short.
     pub fn learn_scale(&mut self, best: f32) {
         self.scale = (self.scale * best).clamp(MIN_SCALE, 1.0);
     }

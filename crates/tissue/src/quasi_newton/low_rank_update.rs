@@ -1,5 +1,5 @@
-//! Contacts that began or ended since the matrix was factorised, and squeezed elements, as a low-rank
-//! update of its inverse.
+//! Contacts that began or ended since the matrix was factorised, and squeezed elements, as a
+//! low-rank update of its inverse.
 //!
 //! The factor contains the stiffness of the nodes that pressed when it was made. New and lost
 //! contacts differ from it by a stiffness on a few nodes: a matrix of low rank. By Woodbury's
@@ -20,8 +20,8 @@ const MAX_NODES: usize = 16;
 /// Greatest number of directions in the update.
 const MAX_DIRECTIONS: usize = 3 * MAX_NODES + MAX_SQUEEZED;
 
-/// The difference between the matrix now and the factor. Its directions are three of each node, then
-/// one of each squeezed element.
+/// The difference between the matrix now and the factor. Its directions are three of each node,
+/// then one of each squeezed element.
 pub(super) struct LowRankUpdate {
     /// Nodes and the stiffness that is added (N/m); those whose stiffness is taken out of the
     /// factor come first.
@@ -39,8 +39,8 @@ pub(super) struct LowRankUpdate {
     stale: bool,
     /// Numbers of a column.
     length: usize,
-    /// 1 / stiffness + the inverse's block of the directions, as L D L': what is below the diagonal of
-    /// L, and D on it.
+    /// 1 / stiffness + the inverse's block of the directions, as L D L': what is below the diagonal
+    /// of L, and D on it.
     matrix: Vec<f64>,
     shares: Vec<f64>,
     /// Whether the matrix is that of a sum that is positive definite.
@@ -121,8 +121,8 @@ impl LowRankUpdate {
         self.usable = self.factorise();
     }
 
-    /// Sets the squeezed elements, gradients in the rest frame, at most [`MAX_SQUEEZED`]. The nodes are
-    /// to be set after it.
+    /// Sets the squeezed elements, gradients in the rest frame, at most [`MAX_SQUEEZED`]. The nodes
+    /// are to be set after it.
     #[inline(always)]
     pub fn set_squeezed<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32], squeezed: &[Squeezed]) {
         if self.squeezed == squeezed {
@@ -194,7 +194,8 @@ impl LowRankUpdate {
         }
     }
 
-    /// Builds the matrix of the directions and its L D L'. False if the sum is not positive definite.
+    /// Builds the matrix of the directions and its L D L'. False if the sum is not positive
+    /// definite.
     fn factorise(&mut self) -> bool {
         let n = 3 * self.nodes.len() + self.squeezed.len();
         for j in 0..n {

@@ -13,7 +13,8 @@
 //!
 //! From the substep down: this file (a substep of an island), `minimise` (its minimisation),
 //! `two_loop` and `line_search` (one step of it), `body_system` and `apply_step` (one body),
-//! `system` (its matrix), `low_rank_update` (what is not in it), `elements` and `stress` (its elements).
+//! `system` (its matrix), `low_rank_update` (what is not in it), `elements` and `stress` (its
+//! elements).
 
 mod apply_step;
 mod body_system;

@@ -24,8 +24,8 @@ impl QuasiNewtonSolver {
         (rest.warped, rest.has_gradient) = (false, false);
     }
 
-    /// Writes the gradient of elements and inertia into the next gradient: a known one while the body
-    /// stays where it is.
+    /// Writes the gradient of elements and inertia into the next gradient: a known one while the
+    /// body stays where it is.
     pub fn take_own_gradient(&mut self, h: f32) {
         let Self { level, elements, iterate, rest, .. } = self;
         let stays = elements.in_place && same_rows(*level, &iterate.x, &rest.x);
@@ -92,8 +92,8 @@ impl QuasiNewtonSolver {
         targets[..free].copy_from_slice(&x[..free]);
     }
 
-    /// Measures the direction, as it would be without the `scale`, and the body's motion, which is zero
-    /// before the `first` step.
+    /// Measures the direction, as it would be without the `scale`, and the body's motion, which is
+    /// zero before the `first` step.
     pub fn measure_direction(&mut self, first: bool, scale: f32) {
         self.progress.longest = dispatch!(self.level, _simd => max_coordinate(&self.iterate.direction)) / scale;
         self.progress.gone = if first { 0.0 } else { self.gone() };

@@ -23,8 +23,8 @@ pub(super) struct RestCache {
     pub start: Vec<Row>,
     /// Whether the warp belongs to that place.
     pub warped: bool,
-    /// Gradient of elements and inertia at that place, and the predictor for which it holds; whether
-    /// it is known.
+    /// Gradient of elements and inertia at that place, and the predictor for which it holds;
+    /// whether it is known.
     pub gradient: Vec<Row>,
     pub predictor: Vec<Row>,
     pub has_gradient: bool,

@@ -50,8 +50,8 @@ impl Stress {
         }
     }
 
-    /// How much larger the second derivative of the energy by the volume ratio is at `ratio` than at
-    /// rest (Pa).
+    /// How much larger the second derivative of the energy by the volume ratio is at `ratio` than
+    /// at rest (Pa).
     pub fn hardening(&self, ratio: f32) -> f32 {
         match self {
             Self::StableNeoHookean { volume, .. } | Self::Corotated { volume, .. } => {

@@ -9,8 +9,9 @@ use super::low_rank_update::LowRankUpdate;
 use super::squeezed::{MAX_SQUEEZED, Squeezed};
 use super::warp::Warp;
 use crate::Body;
-use crate::contact::{ContactSet, Source};
+use crate::contact::ContactSet;
 use crate::lanes::Row;
+use crate::state::Source;
 use fearless_simd::{Level, dispatch};
 use glam::{Mat3A, Vec3A};
 
@@ -103,8 +104,8 @@ impl System {
         self.update.reset();
     }
 
-    /// Updates the inverse for the elements that are squeezed at the positions `x`. The contacts are
-    /// to be updated after it.
+    /// Updates the inverse for the elements that are squeezed at the positions `x`. The contacts
+    /// are to be updated after it.
     pub fn update_squeezed(&mut self, level: Level, layout: &Layout, elements: &Elements, held: &[bool], x: &[Row]) {
         let Self { factor: Some(factor), update, warp, squeezed, right, .. } = self else { return };
         elements.find_squeezed(layout, x, held, squeezed);
@@ -186,8 +187,8 @@ impl System {
         nearest_rotation(Mat3A::from_cols(inverse[0], inverse[1], inverse[2])).transpose()
     }
 
-    /// x = P^-1 x, P being the stiffness at rest turned by one `rotation`: unlike the warped one, it
-    /// resists no translation of tissue that is bent.
+    /// x = P^-1 x, P being the stiffness at rest turned by one `rotation`: unlike the warped one,
+    /// it resists no translation of tissue that is bent.
     pub fn apply_turned(&mut self, level: Level, rotation: &Mat3A, x: &mut [Row]) {
         let Self { factor, update, right, .. } = self;
         let Some(factor) = factor else { return };
@@ -205,7 +206,8 @@ impl System {
         }
     }
 
-    /// Subtracts the product of the body's matrix without springs, turned by one `rotation`, and `x`.
+    /// Subtracts the product of the body's matrix without springs, turned by one `rotation`, and
+    /// `x`.
     pub fn subtract_product(&self, rotation: &Mat3A, x: &[Row], from: &mut [Row]) {
         let Some(factor) = &self.factor else { return };
         let back = rotation.transpose();
@@ -216,8 +218,8 @@ impl System {
         }
     }
 
-    /// The stiffness of the springs of a node in the matrix: those in the factor, and what the update
-    /// adds or takes (N/m).
+    /// The stiffness of the springs of a node in the matrix: those in the factor, and what the
+    /// update adds or takes (N/m).
     pub fn spring(&self, i: usize) -> f32 {
         self.holding(i) + self.update.added(i as u32)
     }

@@ -1,7 +1,7 @@
 //! The part of a state that belongs to one body: its physics, and the solvers' warm start.
 
+use super::friction::{Anchor, FeatureAnchor, Source, Stretch};
 use crate::Body;
-use crate::contact::{Anchor, FeatureAnchor, Source, Stretch};
 use glam::Vec3A;
 use trocar_lattice::BodyState as LatticeState;
 use xxhash_rust::xxh3::Xxh3;

@@ -1,14 +1,16 @@
 //! The part of a simulation that changes: plain data.
 
 mod body_state;
+mod capture;
+mod friction;
 mod motion;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use body_state::{BodyState, Repair, WarmStart};
+pub(crate) use friction::{Anchor, FeatureAnchor, FeatureKey, Source, Stretch};
 pub use motion::BodyMotion;
 
-use crate::contact::Source;
 use crate::{Body, Grasp, Hole, Model};
 use glam::{DVec3, Vec3A};
 use xxhash_rust::xxh3::Xxh3;

@@ -1,8 +1,8 @@
 //! A body's motion in double precision and node order: what other integrators work on.
 
 use super::body_state::BodyState;
+use super::friction::{Anchor, Source};
 use crate::Body;
-use crate::contact::{Anchor, Source};
 use glam::{DVec3, Vec3A};
 
 /// The motion of a body in double precision, in node order.

@@ -4,7 +4,7 @@
 
 use super::State;
 use super::body_state::{BodyState, Repair, WarmStart};
-use crate::contact::{Anchor, FeatureAnchor, Source, Stretch};
+use super::{Anchor, FeatureAnchor, Source, Stretch};
 use crate::{
     Backend, BodyDescription, Compliance, ConstitutiveModel, Grasp, Hole, LatticeSettings, Material, Model,
     ModelBuilder,

@@ -23,15 +23,15 @@ const MAX_CELLS: f64 = 4e6;
 #[derive(Clone, Debug, PartialEq)]
 pub struct SupportField {
     /// Where the first coefficient lies on the level bed (m).
-    pub(super) origin: DVec3,
+    pub(crate) origin: DVec3,
     /// Unit vectors along columns and rows of the grid, and up.
-    pub(super) axes: [DVec3; 3],
+    pub(crate) axes: [DVec3; 3],
     /// Side of a cell (m).
-    pub(super) cell: f64,
+    pub(crate) cell: f64,
     /// Columns and rows.
-    pub(super) size: [usize; 2],
+    pub(crate) size: [usize; 2],
     /// Coefficients of the spline, row by row: heights above the bed (m).
-    pub(super) heights: Vec<f64>,
+    pub(crate) heights: Vec<f64>,
     friction: f64,
 }
 
@@ -177,7 +177,7 @@ impl SupportField {
         [middle - 1.0, place - middle]
     }
 
-    pub(super) fn contact(&self, p: DVec3) -> SupportContact {
+    pub(crate) fn contact(&self, p: DVec3) -> SupportContact {
         let [u, v, w] = self.place(p);
         let ([column, s], [row, t]) = (self.knot(u, 0), self.knot(v, 1));
         let (across, down) = (weights(s), weights(t));

@@ -1,10 +1,8 @@
 //! Supports of a body: one-sided surfaces with a quadratic penalty and Coulomb friction.
 
 mod field;
-mod local;
 
 pub use field::SupportField;
-pub(crate) use local::LocalSupport;
 
 use glam::{DMat3, DVec3};
 

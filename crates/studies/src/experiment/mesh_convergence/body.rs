@@ -26,6 +26,23 @@ const MIDDLE: f64 = 0.55;
 /// Parts of an edge of the surface into which a patch is divided.
 const PARTS: usize = 8;
 
+/// Share of its weight under which the organ sags from its base. Under all of it a soft tube hangs
+/// straight down, and shows its length instead of its stiffness.
+pub(super) const WEIGHT_SHARE: f64 = 0.01;
+
+/// Standard gravity (m/s2).
+pub(super) const GRAVITY: f64 = 9.80665;
+
+/// Force that lifts the middle of the organ, and force that pulls a patch of it (N).
+pub(super) const LIFT: f64 = 2e-3;
+pub(super) const PULL: f64 = 0.1;
+
+/// How far the grasp is lifted (m).
+pub(super) const GRASP_LIFT: f64 = 8e-3;
+
+/// Parts of the way of the grasp.
+pub(super) const GRASP_PARTS: usize = 4;
+
 /// An appendix with what holds it and what acts on it. Loads and measures are defined on the body,
 /// so that they are the same for every mesh.
 pub(super) struct TestBody {

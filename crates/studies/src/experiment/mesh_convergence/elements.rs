@@ -1,6 +1,6 @@
 //! One trial: the body by one kind and size of elements, in every case.
 
-use super::body::{Hold, Patch, TestBody};
+use super::body::{GRASP_LIFT, GRASP_PARTS, GRAVITY, Hold, LIFT, PULL, Patch, TestBody, WEIGHT_SHARE};
 use super::lattice;
 use super::result::{Cases, MeshRow};
 use crate::Result;
@@ -11,23 +11,8 @@ use trocar_tissue::Material;
 use trocar_tissue_reference::oracle::Precision;
 use trocar_tissue_reference::statics::{Elements, Load, Loading, Place};
 
-/// Share of its weight under which the organ sags from its base. Under all of it a soft tube hangs
-/// straight down, and shows its length instead of its stiffness.
-pub(super) const WEIGHT_SHARE: f64 = 0.01;
-
-/// Standard gravity (m/s2).
-pub(super) const GRAVITY: f64 = 9.80665;
-
-/// Force that lifts the middle of the organ, and force that pulls a patch of it (N).
-pub(super) const LIFT: f64 = 2e-3;
-pub(super) const PULL: f64 = 0.1;
-
-/// How far the grasp is lifted (m).
-pub(super) const GRASP_LIFT: f64 = 8e-3;
-
-/// Parts of a loading, and of the way of the grasp.
-pub(super) const PARTS: usize = 2;
-pub(super) const GRASP_PARTS: usize = 4;
+/// Parts of a loading.
+const PARTS: usize = 2;
 
 /// Elements of a patch, and share of the shear modulus that its mean gradient has.
 const PATCH_SIZE: usize = 8;

@@ -1,7 +1,6 @@
 //! The body by a lattice of hexahedra.
 
-use super::body::{Hold, Patch, TestBody};
-use super::elements::{GRASP_LIFT, GRASP_PARTS, GRAVITY, LIFT, PULL, WEIGHT_SHARE};
+use super::body::{GRASP_LIFT, GRASP_PARTS, GRAVITY, Hold, LIFT, PULL, Patch, TestBody, WEIGHT_SHARE};
 use super::result::{Cases, MeshRow};
 use crate::{Error, Result};
 use glam::DVec3;

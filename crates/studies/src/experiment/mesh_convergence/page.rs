@@ -10,8 +10,8 @@ use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
 
 /// Greatest error of the default tissue's sag and of its local pull.
-const MOST_SAG: f64 = 0.05;
-const MOST_PULL: f64 = 0.15;
+const MAX_SAG_ERROR: f64 = 0.05;
+const MAX_PULL_ERROR: f64 = 0.15;
 
 /// Kinds of elements that come in several sizes.
 const SIZED: [&str; 2] = ["linear", "lattice"];
@@ -35,9 +35,9 @@ pub(super) fn document(r: &MeshConvergenceResult) -> Result<Document> {
     );
     let cards = [
         Card::new("Sag", percent(r.default_sag_error, 1), "greatest error of the default tissue; 5% at most")
-            .met(r.default_sag_error <= MOST_SAG),
+            .met(r.default_sag_error <= MAX_SAG_ERROR),
         Card::new("Local pull", percent(r.default_pull_error, 1), "greatest error of the default tissue; 15% at most")
-            .met(r.default_pull_error <= MOST_PULL),
+            .met(r.default_pull_error <= MAX_PULL_ERROR),
         Card::new("Sag, corrected", percent(r.corrected_sag_error, 1), "with mesh_correction"),
         Card::new("Local pull, corrected", percent(r.corrected_pull_error, 1), "with mesh_correction"),
         Card::new("Lift", percent(r.default_lift_error, 1), "greatest error of the default tissue"),

@@ -54,16 +54,14 @@ impl Hull {
         // NaN fails every comparison.
         if let Some(i) = points.iter().position(|p| !(p.is_finite() && p.abs().max_element() <= MAX_SHAPE_SIZE)) {
             return Err(format!(
-                "point {i} of a hull is {} m; finite coordinates within {MAX_SHAPE_SIZE} m make sense",
+                "point {i} of a hull is {} m; coordinates must be finite and within {MAX_SHAPE_SIZE} m",
                 points[i]
             ));
         }
         let (low, high) = points.iter().fold((points[0], points[0]), |(l, h), p| (l.min(*p), h.max(*p)));
         let extent = (high - low).length();
         if extent < MIN_HULL_EXTENT {
-            return Err(format!(
-                "a hull's points lie within {extent:.1e} m; {MIN_HULL_EXTENT:.0e} m or more make sense"
-            ));
+            return Err(format!("a hull's points lie within {extent:.1e} m; must be {MIN_HULL_EXTENT:.0e} m or more"));
         }
         let mut triangles = first_tetrahedron(points, extent)?.to_vec();
         while let Some(p) = farthest_outside(points, &triangles, ON_FACE * extent) {

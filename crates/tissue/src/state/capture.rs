@@ -1,7 +1,7 @@
 //! How a grasp begins: on nodes where they are, or at prescribed places.
 
-use super::Grasp;
-use crate::{Model, State};
+use super::State;
+use crate::{Grasp, Model};
 use glam::{DVec3, Vec3A};
 use trocar_core::Pose;
 

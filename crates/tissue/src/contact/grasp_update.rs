@@ -1,8 +1,7 @@
 //! The stage after the solve: slip and tearing of grasps, from their nodes in the last substep.
 
-use super::Grasp;
-use crate::Event;
-use crate::contact::CompliantNode;
+use super::{CompliantNode, Event};
+use crate::Grasp;
 use glam::DVec3;
 
 impl Grasp {

@@ -1,6 +1,5 @@
 //! What friction remembers from frame to frame: it belongs to the state.
 
-use super::tool_features::FeatureKey;
 use glam::Vec3A;
 
 /// What a vertex touches.
@@ -26,8 +25,13 @@ pub(crate) struct Anchor {
     pub place: Vec3A,
 }
 
-/// Where a point of an edge or triangle is that presses on a collider, and how far friction's spring
-/// between them is stretched.
+/// Name of an edge or triangle that touches a round part of a tool: its vertices, ascending, but
+/// that an edge repeats the first at the end; and the end of the axis that a triangle meets, 0 for
+/// an edge.
+pub(crate) type FeatureKey = ([u32; 3], u8);
+
+/// Where a point of an edge or triangle is that presses on a collider, and how far friction's
+/// spring between them is stretched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FeatureAnchor {
     pub collider: u32,

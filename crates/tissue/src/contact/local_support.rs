@@ -1,7 +1,6 @@
 //! Supports in a body's own frame and in single precision, for the sweeps.
 
-use super::{Support, SupportField, SupportPlane};
-use crate::Body;
+use crate::{Body, Support, SupportField, SupportPlane};
 use glam::{DVec3, Vec3A};
 
 /// A support in a body's frame.

@@ -1,15 +1,9 @@
 //! A body's nodes in a lattice: what the lattice solver knows of a body that never changes.
 
-use crate::body::BodyData;
-use crate::state::BodyState;
-use crate::{LatticeSettings, Result};
+use crate::LatticeSettings;
 use glam::{DVec3, Vec3A};
 use std::sync::Arc;
-use trocar_geometry::TetMesh;
-use trocar_lattice::{
-    Body as LatticeBody, BodyDescription, BodyState as LatticeState, EmbeddedPoint, Lattice, LatticeOptions, Material,
-    RestStiffness,
-};
+use trocar_lattice::{Body as LatticeBody, BodyState as LatticeState, EmbeddedPoint, RestStiffness};
 
 /// Rounds of the search for a lattice whose nodes are at given places.
 const FIT_ROUNDS: usize = 40;
@@ -42,48 +36,9 @@ impl std::ops::Deref for Embedding {
 }
 
 impl Embedding {
-    /// Embeds a body. None if all of it is pinned.
-    ///
-    /// # Errors
-    /// A cell out of range, or too many of them.
-    pub fn of(body: &BodyData, settings: LatticeSettings) -> Result<Option<Self>> {
-        let moves = |tet: &&[u32; 4]| tet.iter().any(|node| !body.pinned[*node as usize]);
-        let elements: Vec<u32> =
-            (0..body.rest.tets.len() as u32).filter(|t| moves(&&body.rest.tets[*t as usize])).collect();
-        if elements.is_empty() {
-            return Ok(None);
-        }
-        let tets: Vec<[u32; 4]> = elements.iter().map(|t| body.rest.tets[*t as usize]).collect();
-        let mut nodes: Vec<u32> = tets.iter().flatten().copied().collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        let at = |node: u32| nodes.partition_point(|other| *other < node) as u32;
-        let mesh = TetMesh {
-            vertices: nodes.iter().map(|node| body.rest.vertices[*node as usize] - body.origin).collect(),
-            tets: tets.iter().map(|tet| tet.map(at)).collect(),
-        };
-        let refused =
-            |error: trocar_lattice::Error| crate::Error::Body { body: body.name.clone(), reason: error.to_string() };
-        // The pieces of a cut body have the grid of the whole.
-        let options = LatticeOptions { origin: Some(DVec3::ZERO), ..LatticeOptions::new(settings.cell) };
-        let lattice = Lattice::of_mesh(&mesh, &options).map_err(refused)?;
-        let embedded = lattice.embed_nodes().map_err(refused)?;
-        let pinned: Vec<u32> = nodes.iter().filter(|node| body.pinned[**node as usize]).map(|node| at(*node)).collect();
-        let pins = lattice.embed_held(&pinned).map_err(refused)?;
-        let material = Material {
-            law: settings.law,
-            young_modulus: body.material.young_modulus,
-            poisson_ratio: body.material.poisson_ratio,
-            density: body.material.density,
-        };
-        let description = BodyDescription { name: body.name.clone(), lattice, material, pins, fixed: Vec::new() };
-        let lattice = LatticeBody::new(description).map_err(refused)?;
-        let mut points = vec![None; body.pinned.len()];
-        for (node, point) in nodes.iter().zip(embedded) {
-            points[body.internal[*node as usize] as usize] = Some(point);
-        }
-        let rest = lattice.rest_stiffness();
-        Ok(Some(Self(Arc::new(EmbeddingData { settings, elements, body: lattice, rest, points }))))
+    /// Shares the data.
+    pub fn new(data: EmbeddingData) -> Self {
+        Self(Arc::new(data))
     }
 
     /// The lattice at rest.
@@ -119,14 +74,12 @@ impl Embedding {
         }
     }
 
-    /// Makes the lattice follow vertices that were moved from outside: as near to them as it can
-    /// come. A lattice that the vertices follow keeps every bit.
-    pub fn follow(&self, state: &mut BodyState) {
-        let Some(mut lattice) = state.lattice.take() else { return };
-        self.fit(&state.x, &mut lattice.positions);
-        self.fit(&state.v, &mut lattice.velocities);
-        self.write(&lattice, &mut state.x, &mut state.v);
-        state.lattice = Some(lattice);
+    /// Makes the lattice follow vertices that were moved from outside (positions `x`, velocities
+    /// `v`): as near to them as it can come. A lattice that the vertices follow keeps every bit.
+    pub fn follow(&self, lattice: &mut LatticeState, x: &mut [Vec3A], v: &mut [Vec3A]) {
+        self.fit(x, &mut lattice.positions);
+        self.fit(v, &mut lattice.velocities);
+        self.write(lattice, x, v);
     }
 
     /// Fits a field over the lattice to one over the vertices. Every node takes the mean of what
