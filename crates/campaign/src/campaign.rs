@@ -70,8 +70,8 @@ impl Campaign {
     }
 
     /// Runs the missing episodes of the campaign in `output`, at most `max_episodes` in total, and
-    /// renders videos of some failures and successes. Returns the campaign's store and manifest, and
-    /// what success is shown by.
+    /// renders videos of some failures and successes. Returns the campaign's store and manifest,
+    /// and what success is shown by.
     ///
     /// # Errors
     /// As [`run`](Self::run).

@@ -39,6 +39,6 @@ pub use plots::{lift_and_rcm, lifts, success_by_name, success_over};
 pub use policy_server::interpreter;
 pub use policy_spec::PolicySpec;
 pub use store::{EpisodeFiles, EpisodeRecord, Store};
-pub use table::{CampaignResult, Comparison, EndCounts, PolicyRow, StageCount, median};
+pub use table::{CampaignResult, Comparison, EndCounts, PolicyRow, StageCount};
 pub use trocar_workflow::{Error, Result};
 pub use worker::Worker;

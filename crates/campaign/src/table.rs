@@ -10,6 +10,7 @@ use crate::outcomes::distinct_outcomes;
 use crate::store::EpisodeRecord;
 use serde::Serialize;
 use std::path::Path;
+use trocar_core::median;
 use trocar_task::{End, Warnings};
 
 /// Number of episodes that passed a stage.
@@ -234,7 +235,7 @@ fn row(name: &str, records: &[&EpisodeRecord], names: &[&str], manifest: &Manife
     let passed = records.iter().filter(|k| k.summary.passed).count();
     let attached: Vec<&&EpisodeRecord> = records.iter().filter(|k| k.summary.attached).collect();
     let ends = EndCounts::of(records.iter().map(|k| k.summary.end.as_ref()));
-    let peak = |of: fn(&trocar_task::ArmSummary) -> f64| median(records.iter().map(|k| k.peak(of)).collect());
+    let peak = |of: fn(&trocar_task::ArmSummary) -> f64| median(records.iter().map(|k| k.peak(of)).collect::<Vec<_>>());
     let policy_error = records.iter().find_map(|k| match &k.summary.end {
         Some(End::PolicyError { why }) => Some(why.clone()),
         _ => None,
@@ -251,8 +252,8 @@ fn row(name: &str, records: &[&EpisodeRecord], names: &[&str], manifest: &Manife
         ends,
         attached: attached.len(),
         held_to_end: attached.iter().filter(|k| k.summary.held_to_end).count(),
-        lift_median_mm: median(attached.iter().filter_map(|k| k.summary.lift_mm).collect()),
-        rcm_median_mm: median(attached.iter().filter_map(|k| k.loaded_rcm_mm()).collect()),
+        lift_median_mm: median(attached.iter().filter_map(|k| k.summary.lift_mm).collect::<Vec<_>>()),
+        rcm_median_mm: median(attached.iter().filter_map(|k| k.loaded_rcm_mm()).collect::<Vec<_>>()),
         rcm_max_mm: records.iter().map(|k| k.summary.rcm_peak_mm).max_by(f64::total_cmp),
         rcm_within: attached.iter().filter(|k| k.summary.rcm_peak_mm <= manifest.rcm_threshold_mm).count(),
         rcm_within_5_mm: attached.iter().filter(|k| k.summary.rcm_peak_mm <= 5.0).count(),
@@ -263,7 +264,7 @@ fn row(name: &str, records: &[&EpisodeRecord], names: &[&str], manifest: &Manife
         peak_contact_n: peak(|a| a.peak_contact_n),
         peak_constraint_n: peak(|a| a.peak_constraint_n),
         peak_jaw_n: peak(|a| a.peak_jaw_n),
-        lag_ms: median(records.iter().filter_map(|k| k.lag_ms()).collect()),
+        lag_ms: median(records.iter().filter_map(|k| k.lag_ms()).collect::<Vec<_>>()),
         inverted_peak: records.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),
         warnings: records.iter().map(|k| k.summary.warnings).sum(),
         policy_error,
@@ -302,13 +303,6 @@ fn mcnemar(a: usize, b: usize) -> f64 {
     (2.0 * tail).min(1.0)
 }
 
-/// The median; `None` without values.
-pub fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    (n > 0).then(|| 0.5 * (values[(n - 1) / 2] + values[n / 2]))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -338,12 +332,5 @@ mod tests {
         let json = serde_json::to_value(EndCounts::of(ends.iter().map(Some))).unwrap();
         assert_eq!(json.as_object().unwrap().len(), ends.len());
         assert!(ends.iter().all(|end| json[end.name()] == 1), "{json}");
-    }
-
-    #[test]
-    fn medians() {
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
-        assert_eq!(median(vec![4.0, 1.0]), Some(2.5));
-        assert_eq!(median(vec![]), None);
     }
 }

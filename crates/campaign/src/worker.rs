@@ -26,8 +26,8 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Builds the cell of `scene`, whose episodes have `specimens`, stepped by one thread. It stands
-    /// at the start of the episode of `seed`.
+    /// Builds the cell of `scene`, whose episodes have `specimens`, stepped by one thread. It
+    /// stands at the start of the episode of `seed`.
     ///
     /// # Errors
     /// A scene that cannot be built.

@@ -3,17 +3,20 @@
 //! - [`Pose`] and [`Wrench`]: a rigid transform, and a force with its torque.
 //! - [`Random`]: a counter-based random generator, independent of the order of evaluation.
 //! - [`interpolate`]: linear and smooth interpolation of numbers.
+//! - [`median`]: of measured values.
 //! - [`Progress`]: how long work reports its progress and learns that it should stop.
 
 pub mod interpolate;
 mod pose;
 mod progress;
 mod random;
+mod statistics;
 mod wrench;
 
 pub use pose::Pose;
 pub use progress::{Progress, Quiet, Silent, StopAfter};
 pub use random::{Random, RandomSequence, mix, standard_normal, unit};
+pub use statistics::median;
 pub use wrench::Wrench;
 
 #[cfg(doctest)]

@@ -79,15 +79,9 @@ fn radius_edge(corners: &[DVec3; 4]) -> f64 {
     if ratio.is_nan() { f64::INFINITY } else { ratio }
 }
 
-/// Middle value, or mean of the two middle values; 0 without values.
-pub(crate) fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    let even = values.len().is_multiple_of(2);
-    let (below, &mut upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
-    if even { 0.5 * (upper + below.iter().copied().fold(f64::NEG_INFINITY, f64::max)) } else { upper }
+/// The median; 0 without values.
+pub(crate) fn median(values: Vec<f64>) -> f64 {
+    trocar_core::median(values).unwrap_or(0.0)
 }
 
 #[cfg(test)]

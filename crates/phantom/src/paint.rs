@@ -6,6 +6,7 @@ use crate::noise::{fractal, smooth};
 use crate::spec::{Organ, TissueAppearance, Vessels};
 use glam::DVec3;
 use rayon::prelude::*;
+use trocar_core::interpolate::smoothstep;
 use trocar_geometry::{SignedDistance, TriMesh};
 
 const VEIN: DVec3 = DVec3::new(112.0, 28.0, 40.0);
@@ -111,8 +112,7 @@ fn bed_color(bed: &Bed, p: DVec3) -> DVec3 {
 
 /// Smooth step: 0 below `low`, 1 above `high`.
 fn step(low: f64, high: f64, x: f64) -> f64 {
-    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
+    smoothstep((x - low) / (high - low))
 }
 
 /// Branching lines at zero crossings of warped noise of feature size `size` (m): about `width` (m)

@@ -86,7 +86,8 @@ macro_rules! choice {
 choice! {
     /// A solver.
     SolverName: ScheduleName {
-        /// Vertex Block Descent as in the paper: 8 substeps of 10 sweeps, from the inertial predictor.
+        /// Vertex Block Descent as in the paper: 8 substeps of 10 sweeps, from the inertial
+        /// predictor.
         Paper => Paper,
         /// The warped, prefactored quasi-Newton method.
         Fast => Fast,
@@ -111,8 +112,8 @@ choice! {
     DesignName: GraspDesignName {
         /// Friction of two closing blades.
         Friction => Friction,
-        /// Nodes tied to the jaws at their places in the undeformed organ, as in the paper: the tissue
-        /// snaps.
+        /// Nodes tied to the jaws at their places in the undeformed organ, as in the paper: the
+        /// tissue snaps.
         RestPose => RestPose,
         /// Nodes tied to the jaws where they are when the jaws close, as in the paper.
         LivePose => LivePose,
@@ -168,7 +169,8 @@ choice! {
     SensorName: trocar_phantom::Sensor {
         /// Independent between pixels and frames.
         Plain => Plain,
-        /// Like stereo matching: smooth over several pixels, slow in time, with widened silhouettes.
+        /// Like stereo matching: smooth over several pixels, slow in time, with widened
+        /// silhouettes.
         Stereo => Stereo,
     }
 }

@@ -1,6 +1,6 @@
 //! Many small models in parallel, beside one model of the same total size.
 
-use crate::scenes::{Organs, Run, Scene, material};
+use crate::scenes::{BenchScene, Organs, Run, material};
 use crate::statistics::median;
 use crate::{Error, Result};
 use serde::Serialize;
@@ -48,10 +48,10 @@ pub(super) fn measure(
 ) -> Result<Vec<ManyRow>> {
     let material = material(12e3, 0.45);
     let small = Organs::analytic_appendix(tets)?;
-    let single = Scene::many(&small, 1, material)?;
-    let together = Scene::many(&small, count, material)?;
+    let single = BenchScene::many(&small, 1, material)?;
+    let together = BenchScene::many(&small, count, material)?;
     let organs = Organs::analytic(count * small.tets())?;
-    let six = Scene::moving(&organs, material)?;
+    let six = BenchScene::moving(&organs, material)?;
     progress.begin("many models", (SOLVERS.len() * threads.len() * (WARM_UP + FRAMES)) as u64);
     let mut rows = Vec::new();
     for name in SOLVERS {

@@ -3,7 +3,7 @@
 use super::machine::Machine;
 use super::timing::Timing;
 use crate::names::{SolverName, kilopascals};
-use crate::scenes::{FRAME, OracleRun, Organs, Run, Scene, material, mean_error, rest_positions, rms_error};
+use crate::scenes::{BenchScene, FRAME, OracleRun, Organs, Run, material, mean_error, rest_positions, rms_error};
 use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
@@ -138,18 +138,18 @@ impl Study for OrgansBench {
         let warm_up = self.frames / 4;
         let damped = material(self.young_modulus, self.poisson_ratio);
         let material = if self.damped { damped } else { Material { viscosity: 0.0, ..damped } };
-        let time = |scene: &Scene| {
+        let time = |scene: &BenchScene| {
             progress.begin(scene.name, (warm_up + self.frames) as u64);
             let mut run = Run::new(scene, schedule, self.threads)?;
             let timing = Timing::of(&mut run, warm_up, self.frames, f64::INFINITY, progress);
             progress.end();
             timing
         };
-        let drag = time(&Scene::drag(&organs, material)?)?;
-        let moving = time(&Scene::moving(&organs, material)?)?;
-        let sagging = time(&Scene::sag(&organs, material)?)?;
+        let drag = time(&BenchScene::drag(&organs, material)?)?;
+        let moving = time(&BenchScene::moving(&organs, material)?)?;
+        let sagging = time(&BenchScene::sag(&organs, material)?)?;
 
-        let sag = Scene::sag(&organs, damped)?;
+        let sag = BenchScene::sag(&organs, damped)?;
         let mut run = Run::new(&sag, schedule, self.threads)?;
         let frames = (self.settle / FRAME).round().max(1.0) as usize;
         progress.begin("sag", frames as u64 + 1);
@@ -167,7 +167,7 @@ impl Study for OrgansBench {
         let sags = rest.iter().zip(&truth).map(|(a, b)| a.distance(*b)).sum::<f64>();
         let free = sag.model.bodies().iter().flat_map(|b| b.pinned()).filter(|p| !**p).count();
 
-        let tube = Tube::run(&Scene::tube(&organs, material)?, schedule, self.threads, progress)?;
+        let tube = Tube::run(&BenchScene::tube(&organs, material)?, schedule, self.threads, progress)?;
         let result = OrgansResult {
             real_time_factor: drag.real_time_factor,
             real_time_factor_moving: moving.real_time_factor,
@@ -210,7 +210,7 @@ struct Tube {
 
 impl Tube {
     fn run(
-        scene: &Scene,
+        scene: &BenchScene,
         schedule: trocar_tissue::SolverSettings,
         threads: usize,
         progress: &dyn Progress,

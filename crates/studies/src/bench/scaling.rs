@@ -3,7 +3,7 @@
 use super::machine::Machine;
 use super::many::{self, ManyRow};
 use super::timing::Timing;
-use crate::scenes::{Organs, Run, Scene, material};
+use crate::scenes::{BenchScene, Organs, Run, material};
 use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
@@ -86,8 +86,8 @@ impl Study for ScalingBench {
         let mut rows: Vec<ScalingRow> = Vec::new();
         for size in &self.sizes {
             job.progress.begin(&format!("{size} tets"), (settings * (WARM_UP + FRAMES)) as u64);
-            let made =
-                Organs::analytic(*size).and_then(|organs| Ok((Scene::moving(&organs, material(12e3, 0.45))?, organs)));
+            let made = Organs::analytic(*size)
+                .and_then(|organs| Ok((BenchScene::moving(&organs, material(12e3, 0.45))?, organs)));
             for schedule in SOLVERS {
                 for threads in &self.threads {
                     let row = match &made {
@@ -112,7 +112,7 @@ impl Study for ScalingBench {
 impl ScalingBench {
     fn row(
         &self,
-        scene: &Scene,
+        scene: &BenchScene,
         organs: &Organs,
         schedule: &str,
         threads: usize,

@@ -28,7 +28,7 @@ const MOVING_S: f64 = 12.0;
 /// Amplitude (m) and frequency (Hz) of the operator's motion.
 const MOTION: (f64, f64) = (0.004, 0.5);
 /// Longest wait for an episode (s).
-const MOST_S: u64 = 600;
+const MAX_WAIT_S: u64 = 600;
 
 /// Cost of a client of the live view to the simulation, size of frames, and latency.
 #[derive(Clone, Debug, Args)]
@@ -111,7 +111,7 @@ impl Driver<'_> {
 
     /// Waits until the episode has ended. Returns the wall time from `from` (s).
     fn ended(&mut self, from: Instant) -> Result<f64> {
-        let end = from + Duration::from_secs(MOST_S);
+        let end = from + Duration::from_secs(MAX_WAIT_S);
         while Instant::now() < end {
             check_interrupted(self.progress)?;
             let got = self.control.receive(Duration::from_millis(200)).map_err(failed)?;
@@ -119,7 +119,7 @@ impl Driver<'_> {
                 return Ok((got.at - from).as_secs_f64());
             }
         }
-        Err(failed(format!("the episode has not ended after {MOST_S} s")))
+        Err(failed(format!("the episode has not ended after {MAX_WAIT_S} s")))
     }
 
     /// Wall time of the episode as fast as it goes (s), with a client that takes frames or without,
@@ -269,7 +269,7 @@ impl Study for ViewBench {
         .map_err(failed)?;
         let mut control = Client::connect(&server.wire()).map_err(failed)?;
         let ready = |m: &Received| m.kind() == "status" && m.header["phase"] != "building";
-        let status = control.wait(Duration::from_secs(MOST_S), ready).map_err(failed)?;
+        let status = control.wait(Duration::from_secs(MAX_WAIT_S), ready).map_err(failed)?;
         if status.header["phase"] == "failed" {
             return Err(failed(status.header["message"].as_str().unwrap_or("the scene cannot be built")));
         }

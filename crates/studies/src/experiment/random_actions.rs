@@ -91,8 +91,8 @@ pub struct RandomActionsResult {
     pub suspensions_per_1000_actions: f64,
     /// What was beyond what tissue bears, in 1,000 actions.
     pub warnings_per_1000_actions: f64,
-    /// Actions after which an instrument's axis was inside an organ that it had not punctured, of all
-    /// seeds.
+    /// Actions after which an instrument's axis was inside an organ that it had not punctured, of
+    /// all seeds.
     pub axes_inside: usize,
     /// What was beyond what tissue bears, in all seeds.
     #[serde(flatten)]
@@ -115,6 +115,7 @@ impl Study for RandomActionsExperiment {
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> =
         Some("Output folder of trials and report. Finished seeds in it are used again.");
+    const SCHEMA: u32 = 2;
     type Figures = RandomActionsResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(RandomActionsResult, Document)> {

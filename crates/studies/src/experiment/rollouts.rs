@@ -6,9 +6,8 @@ use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
-use trocar_campaign::{
-    Campaign, CampaignResult, EpisodeRecord, Manifest, PolicyRow, PolicySpec, lift_and_rcm, lifts, median,
-};
+use trocar_campaign::{Campaign, CampaignResult, EpisodeRecord, Manifest, PolicyRow, PolicySpec, lift_and_rcm, lifts};
+use trocar_core::median;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::table::{count, fixed, or_dash};
@@ -124,6 +123,7 @@ impl Study for RolloutsExperiment {
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> = Some("Campaign folder: a new one, or one of an earlier run to resume.");
     const WRITES_OWN_FILES: bool = true;
+    const SCHEMA: u32 = 2;
     type Figures = RolloutsResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(RolloutsResult, Document)> {
@@ -166,9 +166,9 @@ impl RolloutsResult {
             held_to_end: attached.iter().filter(|k| k.summary.held_to_end).count(),
             diverged: records.iter().filter(|k| k.summary.diverged).count(),
             passed: made.passed,
-            lift_median_mm: median(attached.iter().filter_map(|k| k.summary.lift_mm).collect()),
-            rcm_peak_median_mm: median(attached.iter().map(|k| k.summary.rcm_peak_mm).collect()),
-            rcm_loaded_median_mm: median(attached.iter().filter_map(|k| k.loaded_rcm_mm()).collect()),
+            lift_median_mm: median(attached.iter().filter_map(|k| k.summary.lift_mm).collect::<Vec<_>>()),
+            rcm_peak_median_mm: median(attached.iter().map(|k| k.summary.rcm_peak_mm).collect::<Vec<_>>()),
+            rcm_loaded_median_mm: median(attached.iter().filter_map(|k| k.loaded_rcm_mm()).collect::<Vec<_>>()),
             rcm_within_3_mm: within(THRESHOLD_MM),
             rcm_within_5_mm: within(ABORT_MM),
             inverted_peak: records.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),

@@ -32,7 +32,8 @@ pub struct Organs {
     pub source: String,
 }
 
-/// Procedural organs: name, share of the elements, half axes of an ellipsoid (m), after specimen A.
+/// Procedural organs: name, share of the elements, half axes of an ellipsoid (m), after the paper's
+/// specimen A.
 const ELLIPSOIDS: [(&str, f64, [f64; 3]); 5] = [
     ("cecum", 0.34, [0.0350, 0.0110, 0.0076]),
     ("bowel 1", 0.18, [0.0290, 0.0065, 0.0056]),

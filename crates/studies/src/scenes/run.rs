@@ -1,6 +1,6 @@
 //! Runs of a scene by a solver and by the oracle.
 
-use super::scene::{FRAME, Patch, Scene};
+use super::scene::{BenchScene, FRAME, Patch};
 use crate::{Error, Result};
 use glam::DVec3;
 use trocar_tissue::{Grasp, Model, SolverSettings, State, StepReport, Stepper, ToolMotion};
@@ -8,7 +8,7 @@ use trocar_tissue_reference::{Held, Oracle, OracleState};
 
 /// A run of a scene by a solver, frame by frame.
 pub struct Run<'a> {
-    scene: &'a Scene,
+    scene: &'a BenchScene,
     stepper: Stepper,
     /// The present state.
     pub state: State,
@@ -21,7 +21,7 @@ impl<'a> Run<'a> {
     ///
     /// # Errors
     /// Invalid solver settings, threads that cannot start.
-    pub fn new(scene: &'a Scene, schedule: SolverSettings, threads: usize) -> Result<Self> {
+    pub fn new(scene: &'a BenchScene, schedule: SolverSettings, threads: usize) -> Result<Self> {
         let stepper = Stepper::new(&scene.model, schedule, FRAME, threads)?;
         let mut state = State::new(&scene.model);
         state.grasps = grasps(scene, &state);
@@ -50,7 +50,7 @@ impl<'a> Run<'a> {
 }
 
 /// Grasps of a scene's patches in `state`, with the tools at the start of their paths.
-pub fn grasps(scene: &Scene, state: &State) -> Vec<Grasp> {
+pub fn grasps(scene: &BenchScene, state: &State) -> Vec<Grasp> {
     let grasp = |(tool, patch): (usize, &Patch)| {
         Grasp::capture(&scene.model, state, patch.body, &patch.nodes, tool, &patch.motion.pose(0.0))
     };
@@ -58,7 +58,7 @@ pub fn grasps(scene: &Scene, state: &State) -> Vec<Grasp> {
 }
 
 /// Motions of the tools between two times (s).
-pub fn tools(scene: &Scene, from: f64, to: f64) -> Vec<ToolMotion> {
+pub fn tools(scene: &BenchScene, from: f64, to: f64) -> Vec<ToolMotion> {
     scene.patches.iter().map(|p| ToolMotion { from: p.motion.pose(from), to: p.motion.pose(to) }).collect()
 }
 
@@ -69,7 +69,7 @@ pub(crate) fn reference(error: trocar_tissue_reference::Error) -> Error {
 
 /// A run of a scene by the oracle, substep by substep.
 pub struct OracleRun<'a> {
-    scene: &'a Scene,
+    scene: &'a BenchScene,
     oracle: Oracle,
     grasps: Vec<Grasp>,
     /// The present state.
@@ -78,7 +78,7 @@ pub struct OracleRun<'a> {
 
 impl<'a> OracleRun<'a> {
     /// A run that begins as [`Run`] does.
-    pub fn new(scene: &'a Scene) -> Self {
+    pub fn new(scene: &'a BenchScene) -> Self {
         let grasps = grasps(scene, &State::new(&scene.model));
         Self { scene, oracle: Oracle::new(&scene.model), grasps, state: OracleState::new(&scene.model) }
     }

@@ -98,7 +98,7 @@ pub struct Patch {
 
 /// A model with moving patches.
 #[derive(Clone, Debug)]
-pub struct Scene {
+pub struct BenchScene {
     /// Its name.
     pub name: &'static str,
     /// The model.
@@ -120,7 +120,7 @@ pub fn material(young_modulus: f64, poisson_ratio: f64) -> Material {
     }
 }
 
-impl Scene {
+impl BenchScene {
     /// The scene of this name, one of [`SCENES`].
     ///
     /// # Errors
@@ -277,7 +277,7 @@ mod tests {
     fn scenes_hold_what_they_say() {
         let organs = Organs::analytic(6_000).unwrap();
         let material = material(12e3, 0.45);
-        let moving = Scene::moving(&organs, material).unwrap();
+        let moving = BenchScene::moving(&organs, material).unwrap();
         assert_eq!(moving.patches.len(), 6);
         for (patch, body) in moving.patches.iter().zip(moving.model.bodies()) {
             let share = body.pinned().iter().filter(|p| **p).count() as f64 / body.len() as f64;
@@ -288,14 +288,14 @@ mod tests {
                 body.name()
             );
         }
-        let drag = Scene::drag(&organs, material).unwrap();
+        let drag = BenchScene::drag(&organs, material).unwrap();
         assert_eq!((drag.patches[0].body, drag.model.bodies()[drag.appendix].name()), (organs.appendix, "appendix"));
-        let tube = Scene::tube(&organs, material).unwrap();
+        let tube = BenchScene::tube(&organs, material).unwrap();
         let pinned = tube.model.bodies()[0].pinned().iter().filter(|p| **p).count();
         let share = pinned as f64 / tube.model.bodies()[0].len() as f64;
         assert!((0.08..0.25).contains(&share), "10 mm of 85: {share}");
         assert!(tube.patches[0].nodes.len() > 3);
-        assert!(!Scene::fall(&organs, material).unwrap().model.bodies()[0].pinned().contains(&true));
+        assert!(!BenchScene::fall(&organs, material).unwrap().model.bodies()[0].pinned().contains(&true));
     }
 
     #[test]

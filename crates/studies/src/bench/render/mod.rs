@@ -184,8 +184,8 @@ impl Set {
         Ok(Self { moving: shapes[MOVING], scene, stage, instruments, view, picture: Picture::default() })
     }
 
-    /// Times of frames in turn, rasterised and traced (ms): the median of each, and the least of the
-    /// first.
+    /// Times of frames in turn, rasterised and traced (ms): the median of each, and the least of
+    /// the first.
     fn preview(&mut self) -> Result<([f64; 2], f64)> {
         let Endoscope { camera, .. } = Endoscope::thirty_degrees();
         // The square centre of the endoscope's picture.

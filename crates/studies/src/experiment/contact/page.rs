@@ -6,8 +6,8 @@ use trocar_report::page::Card;
 use trocar_report::table::{count, fixed, or_dash, percent};
 
 /// Greatest error of a force at rest, and of the one at which a tool slides.
-const MOST: f64 = 0.02;
-const MOST_DRAGGED: f64 = 0.04;
+const MAX_ERROR: f64 = 0.02;
+const MAX_ERROR_DRAGGED: f64 = 0.04;
 
 pub(super) fn document(r: &ContactResult) -> Document {
     Document::new("Contact", "Contact beside the oracle and Hertz").with(spheres(r)).with(drags(r)).with(bodies(r))
@@ -29,9 +29,10 @@ fn spheres(r: &ContactResult) -> Section {
     let most = |of: &dyn Fn(&super::SphereRow) -> f64| r.spheres.iter().map(of).fold(0.0, f64::max);
     let (force, field) = (most(&|row| row.force_error), most(&|row| row.field_error));
     let cards = [
-        Card::new("Force", percent(force, 3), "greatest difference from the oracle; 2% at most").met(force <= MOST),
+        Card::new("Force", percent(force, 3), "greatest difference from the oracle; 2% at most")
+            .met(force <= MAX_ERROR),
         Card::new("Field", percent(field, 3), "greatest distance of a node, over the greatest displacement")
-            .met(field <= MOST),
+            .met(field <= MAX_ERROR),
     ];
     let table = Table::of(
         &r.spheres,
@@ -69,7 +70,7 @@ fn drags(r: &ContactResult) -> Section {
             ("Error", &|row| percent(row.error, 2)),
         ],
     );
-    Section::new("A dragged capsule", lead).cards([card.met(most <= MOST_DRAGGED)]).table(table)
+    Section::new("A dragged capsule", lead).cards([card.met(most <= MAX_ERROR_DRAGGED)]).table(table)
 }
 
 fn bodies(r: &ContactResult) -> Section {
@@ -88,5 +89,5 @@ fn bodies(r: &ContactResult) -> Section {
             ("Field", &|row| percent(row.field_error, 3)),
         ],
     );
-    Section::new("A body on another", lead).cards([card.met(most <= MOST)]).table(table)
+    Section::new("A body on another", lead).cards([card.met(most <= MAX_ERROR)]).table(table)
 }

@@ -4,7 +4,7 @@
 mod step_ladder;
 
 use crate::names::kilopascals;
-use crate::scenes::{Organs, SCENES, Scene, material};
+use crate::scenes::{BenchScene, Organs, SCENES, material};
 use crate::study::{Job, Kind, Study};
 use crate::trials::Outcomes;
 use crate::{Error, Result};
@@ -124,7 +124,7 @@ impl ConvergenceExperiment {
         (scene, young, poisson): (&str, f64, f64),
         progress: &dyn Progress,
     ) -> Result<ConvergenceCase> {
-        let made = Scene::named(scene, organs, material(young, poisson))
+        let made = BenchScene::named(scene, organs, material(young, poisson))
             .and_then(|scene| step_ladder::measure(&scene, &SOLVERS, self.max_iterations, progress));
         let (rows, failure) = match made {
             Ok(rows) => (rows, None),

@@ -2,7 +2,7 @@
 //! minimum found by the oracle, and wall time.
 
 use crate::Result;
-use crate::scenes::{FRAME, OracleRun, Scene, grasps, reference, rest_positions, tools};
+use crate::scenes::{BenchScene, FRAME, OracleRun, grasps, reference, rest_positions, tools};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -60,7 +60,12 @@ fn frames_before(scene: &str) -> Option<usize> {
 }
 
 /// Measures all rows of a scene.
-pub(super) fn measure(scene: &Scene, solvers: &[&str], max: usize, progress: &dyn Progress) -> Result<Vec<StepRow>> {
+pub(super) fn measure(
+    scene: &BenchScene,
+    solvers: &[&str],
+    max: usize,
+    progress: &dyn Progress,
+) -> Result<Vec<StepRow>> {
     let mut run = OracleRun::new(scene);
     let h = FRAME / ORACLE_SUBSTEPS as f64;
     let mut before = run.state.clone();
@@ -121,7 +126,7 @@ fn one_substep(schedule: SolverSettings, iterations: usize) -> SolverSettings {
 
 /// Shared by the rows of a schedule.
 struct Ladder<'a> {
-    scene: &'a Scene,
+    scene: &'a BenchScene,
     start: &'a State,
     /// The start state of the oracle, rounded like the stepper's.
     before: OracleState,
@@ -140,7 +145,7 @@ struct Ladder<'a> {
 
 impl<'a> Ladder<'a> {
     fn new(
-        scene: &'a Scene,
+        scene: &'a BenchScene,
         run: &mut OracleRun<'_>,
         start: &'a State,
         time: f64,
@@ -218,7 +223,7 @@ impl<'a> Ladder<'a> {
     }
 }
 
-fn positions(scene: &Scene, state: &OracleState) -> Vec<DVec3> {
+fn positions(scene: &BenchScene, state: &OracleState) -> Vec<DVec3> {
     (0..scene.model.bodies().len()).flat_map(|b| state.positions(b).iter().copied()).collect()
 }
 

@@ -13,7 +13,8 @@ pub struct CutSample {
     pub force_n: f64,
     /// The torque of that force (N m).
     pub torque_nm: f64,
-    /// The closed form at that angle (N m); none for the tube, and none before the blades meet the slab.
+    /// The closed form at that angle (N m); none for the tube, and none before the blades meet the
+    /// slab.
     pub closed_form_nm: Option<f64>,
 }
 

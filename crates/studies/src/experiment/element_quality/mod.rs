@@ -71,7 +71,7 @@ impl Study for ElementQualityExperiment {
     const NAME: &'static str = "element-quality";
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> = Some(FOLDER);
-    const SCHEMA: u32 = 2;
+    const SCHEMA: u32 = 3;
     type Figures = ElementQualityResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(ElementQualityResult, Document)> {

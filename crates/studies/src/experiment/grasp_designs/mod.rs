@@ -62,7 +62,7 @@ impl Study for GraspDesignsExperiment {
     const NAME: &'static str = "grasp-designs";
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> = Some(FOLDER);
-    const SCHEMA: u32 = 2;
+    const SCHEMA: u32 = 3;
     type Figures = GraspDesignsResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(GraspDesignsResult, Document)> {

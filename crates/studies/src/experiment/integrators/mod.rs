@@ -1,11 +1,11 @@
-//! Fig. 6(b): which integrators stay bounded when specimen A is released under gravity, and how far
+//! Fig. 6(b): which integrators stay bounded when organs are released under gravity, and how far
 //! each is from the equilibrium.
 
 mod forms;
 mod row;
 
 use crate::names::Recorded;
-use crate::scenes::{FRAME, Organs, Scene, material, mean_error, reference, rest_positions};
+use crate::scenes::{BenchScene, FRAME, Organs, material, mean_error, reference, rest_positions};
 use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
@@ -40,8 +40,7 @@ const LIGHT_DAMPING: f64 = 0.02 / 15.0;
 /// Young's modulus (Pa) and Poisson's ratio of organs from a file.
 const TISSUE: (f64, f64) = (12e3, 0.45);
 
-/// Fig. 6(b): which integrators stay bounded when specimen A is released, and the sag error of
-/// each.
+/// Fig. 6(b): which integrators stay bounded when organs are released, and the sag error of each.
 #[derive(Clone, Debug, Args)]
 pub struct IntegratorsExperiment {
     /// Gmsh file (.msh, in metres, z up) with the organs, the lowest 42% of each pinned; by default
@@ -133,7 +132,7 @@ impl IntegratorsExperiment {
     fn pinned(&self, organs: &Organs) -> Result<Model> {
         let tissue = material(TISSUE.0, TISSUE.1);
         let viscosity = if self.undamped { 0.0 } else { LIGHT_DAMPING * TISSUE.0 };
-        Ok(Scene::sag(organs, trocar_tissue::Material { viscosity, ..tissue })?.model)
+        Ok(BenchScene::sag(organs, trocar_tissue::Material { viscosity, ..tissue })?.model)
     }
 
     /// Phantom A with the materials and supports of the cell.

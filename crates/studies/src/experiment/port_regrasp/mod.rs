@@ -55,6 +55,7 @@ impl Study for PortRegraspExperiment {
     const NAME: &'static str = "port-regrasp";
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> = Some(FOLDER);
+    const SCHEMA: u32 = 2;
     type Figures = PortRegraspResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(PortRegraspResult, Document)> {

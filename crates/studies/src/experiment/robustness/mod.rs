@@ -93,6 +93,7 @@ impl Study for RobustnessExperiment {
     const NAME: &'static str = "robustness";
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> = Some("Output folder of the report. Finished conditions in it are used again.");
+    const SCHEMA: u32 = 2;
     type Figures = RobustnessResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(RobustnessResult, Document)> {
@@ -114,8 +115,8 @@ impl Study for RobustnessExperiment {
             let contents: Vec<u64> = sources.iter().map(read).collect::<Result<_>>()?;
             Ok(format!("{:016x} {contents:016x?}", scene_hash(&condition.scene, 0)?))
         };
-        // The controllers see no pictures: unless the task is judged by one, their episodes would be
-        // those of the scene as it is written, and counted again.
+        // The controllers see no pictures: unless the task is judged by one, their episodes would
+        // be those of the scene as it is written, and counted again.
         let judged = scene.program()?.measures.iter().any(|measure| matches!(measure, Measure::Visible(..)));
         let run = all.iter().filter(|condition| judged || !condition.pictures);
         // Each condition is known by its own scene and specimens, so that a run with more factors

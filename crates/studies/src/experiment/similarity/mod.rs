@@ -34,7 +34,8 @@ use trocar_workflow::{check_interrupted, reconstruct_recording};
 /// through the endoscope.
 #[derive(Clone, Debug, Args)]
 pub struct SimilarityExperiment {
-    /// Phantoms; phantom-a, phantom-b and phantom-c by default. The first is also recorded from the side.
+    /// Phantoms; phantom-a, phantom-b and phantom-c by default. The first is also recorded from the
+    /// side.
     #[arg(long = "phantom")]
     pub phantoms: Vec<String>,
     /// How they are recorded.
