@@ -1,6 +1,6 @@
-//! Puts the built page into the program: the one of the folder `page`, which packages have, or with the
-//! feature `page` one that npm builds here from the folder `viewer` of a clone. Otherwise there is
-//! none, and the program serves `viewer/dist`.
+//! Puts the built page into the program: the one of the folder `page`, which packages have, or with
+//! the feature `page` one that npm builds here from the folder `viewer` of a clone. Otherwise there
+//! is none, and the program serves `viewer/dist`.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
-//! The two-arm cell, driven by actions: both instruments move 10 mm deeper while the left one closes.
+//! The two-arm cell, driven by actions: both instruments move 10 mm deeper while the left one
+//! closes.
 
 #![allow(clippy::print_stdout, reason = "an example prints its result")]
 

@@ -1,5 +1,5 @@
-//! The checks of the page of `trocar view`: types, build and tests, with Node. They are skipped, with
-//! the reason, where Node or the network is missing.
+//! The checks of the page of `trocar view`: types, build and tests, with Node. They are skipped,
+//! with the reason, where Node or the network is missing.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -44,8 +44,9 @@ pub fn check(tests: Tests) -> Result<(), &'static str> {
     Ok(())
 }
 
-/// Packages all crates into `target/package`, with the page in the one that serves it. The page is put
-/// into its folder for that time only: a program of a clone serves `viewer/dist`, which changes.
+/// Packages all crates into `target/package`, with the page in the one that serves it. The page is
+/// put into its folder for that time only: a program of a clone serves `viewer/dist`, which
+/// changes.
 pub fn package() -> Result<(), String> {
     node().map_err(|why| format!("packages carry the page, which Node builds: {why}"))?;
     let changed = Command::new("git").args(["status", "--porcelain"]).output().map_err(|e| format!("git: {e}"))?;

@@ -1,9 +1,9 @@
 //! Scissors: when closing blades cut, and what they cut.
 //!
 //! A cutter's blades move like the gripper's. The cut lies in the plane between the blades, over
-//! their length and as wide as they were open; it opens as far as the edges have come. A tube across
-//! the blades is cut through if its whole cross-section is between them, else in part. The cutting
-//! edges have no width: they push no tissue.
+//! their length and as wide as they were open; it opens as far as the edges have come. A tube
+//! across the blades is cut through if its whole cross-section is between them, else in part. The
+//! cutting edges have no width: they push no tissue.
 
 use crate::gripper::{BLADE_TIP, JAW_REGION_BEGIN};
 use crate::{Gripper, Result, World};

@@ -15,7 +15,8 @@ use crate::gripper::MAX_ANGLE;
 /// `docs/measurements/grasp.md`.
 pub const JAW_FORCE: f64 = 0.5;
 
-/// Largest force with which jaws open against tissue, the bed and pinned tissue (N), if they have it.
+/// Largest force with which jaws open against tissue, the bed and pinned tissue (N), if they have
+/// it.
 const OPENING_FORCE: f64 = 1.0;
 
 /// Time from wide open to closed, without tissue (s).
@@ -87,8 +88,8 @@ impl Jaw {
         self.press(angle, force, 1.0, self.opening_force()).min(target)
     }
 
-    /// The angle (rad) after a frame in which the jaw presses with `budget` (N) in one `direction`: -1
-    /// closes it, 1 opens it.
+    /// The angle (rad) after a frame in which the jaw presses with `budget` (N) in one `direction`:
+    /// -1 closes it, 1 opens it.
     fn press(&mut self, angle: f64, force: f64, direction: f64, budget: f64) -> f64 {
         if self.direction != direction {
             (self.direction, self.stiffness, self.last) = (direction, 0.0, None);

@@ -1,5 +1,5 @@
-//! What is taken to be in the mouth: the 15 placements of a synthetic tube (SPEC C3), and those
-//! where nothing is.
+//! What is taken to be in the mouth: the 15 placements of a synthetic tube, and those where
+//! nothing is.
 
 use glam::DVec3;
 use trocar_cell::{CONTACT_SKIN, Gripper, JawRegion, MAX_ANGLE, World, attached, clusters};

@@ -46,8 +46,8 @@ fn close(cell: &mut Cell) {
     (0..15).for_each(|_| drop(cell.step(&Action::targets(&targets)).unwrap()));
 }
 
-/// Closes all jaws, raises the left tip by 20 mm and moves it by 60 mm at 0.1 m/s, through where the
-/// right shaft is.
+/// Closes all jaws, raises the left tip by 20 mm and moves it by 60 mm at 0.1 m/s, through where
+/// the right shaft is.
 fn cross(cell: &mut Cell) -> Vec<CellReport> {
     close(cell);
     shift(cell, "left", 0.02 * DVec3::Z, 15);

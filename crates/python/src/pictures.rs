@@ -8,7 +8,7 @@ use numpy::{PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use trocar_render::RenderSettings;
-use trocar_sensors::{CameraRig, DepthNoise, SensorNoise};
+use trocar_sensors::{CameraNoise, CameraRig, DepthNoise};
 use trocar_task::Episode;
 
 /// Shot and read noise of the colours, with `sensor_noise`.
@@ -39,14 +39,14 @@ impl Eyes {
 }
 
 /// The noise of an episode's cameras.
-fn sensor_noise(episode: &Episode, noise: bool) -> SensorNoise {
+fn sensor_noise(episode: &Episode, noise: bool) -> CameraNoise {
     if !noise {
-        return SensorNoise::default();
+        return CameraNoise::default();
     }
     let seed = episode.seed();
     // Both halves of the seed count.
     let seed = (seed ^ (seed >> 32)) as u32;
-    SensorNoise { color: Some(COLOR_NOISE), depth: Some(DepthNoise::default()), seed }
+    CameraNoise { color: Some(COLOR_NOISE), depth: Some(DepthNoise::default()), seed }
 }
 
 /// A camera as Python is told of it: name, height and width (px) of what policies see, whether it

@@ -161,7 +161,8 @@ mod tests {
         assert!(check_size(Path::new("liver.stl"), &box_of(0.18), Unit::Millimetre).is_ok());
     }
 
-    /// A liver in centimetres read as millimetres has an organ's length, but no element fits into it.
+    /// A liver in centimetres read as millimetres has an organ's length, but no element fits into
+    /// it.
     #[test]
     fn a_mesher_that_fails_names_the_unit() {
         let corners = [[0.0, 0.0, 0.0], [3e-3, 0.0, 0.0], [0.0, 2e-3, 0.0], [0.0, 0.0, 1e-3]];

@@ -57,20 +57,20 @@ impl Actions {
 
 /// Limits of accepted chunks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ActionLimits {
+pub struct ReplyLimits {
     /// Number of components that an action must have; `None` accepts any.
     pub dim: Option<usize>,
     /// Maximum number of actions in a chunk. Chunks of openpi's models have 8 to 50.
     pub max_horizon: usize,
 }
 
-impl Default for ActionLimits {
+impl Default for ReplyLimits {
     fn default() -> Self {
         Self { dim: None, max_horizon: 1024 }
     }
 }
 
-impl ActionLimits {
+impl ReplyLimits {
     /// Reads the actions of a reply: its field `actions`, or the reply itself if it is an array, as
     /// older RoboArena servers send.
     ///

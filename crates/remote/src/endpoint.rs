@@ -1,6 +1,6 @@
 //! The address of a policy server, with time limits.
 
-use crate::actions::ActionLimits;
+use crate::actions::ReplyLimits;
 use crate::error::{Error, Result, one_line};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -67,7 +67,7 @@ pub struct Endpoint {
     /// Maximum size of a message (bytes).
     pub max_message: usize,
     /// Limits of accepted chunks.
-    pub actions: ActionLimits,
+    pub actions: ReplyLimits,
     /// The protocol of the server.
     pub dialect: Dialect,
     /// When it becomes true, every wait ends with [`Error::Interrupted`].
@@ -94,7 +94,7 @@ impl Endpoint {
             timeouts: Timeouts::default(),
             retry: Retry::default(),
             max_message: 16 << 20,
-            actions: ActionLimits::default(),
+            actions: ReplyLimits::default(),
             dialect: Dialect::default(),
             interrupt: None,
             label: None,

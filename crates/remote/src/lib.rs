@@ -45,7 +45,7 @@ mod roboarena;
 mod value;
 mod wire;
 
-pub use actions::{ActionLimits, Actions};
+pub use actions::{Actions, ReplyLimits};
 pub use array::{Array, Dtype};
 pub use client::{Client, Reply};
 pub use endpoint::{Dialect, Endpoint, Retry, Timeouts};

@@ -7,7 +7,7 @@ mod common;
 use common::{actions, after_request, array, endpoint, floats, linger, observation, text};
 use std::io::Write;
 use std::sync::Mutex;
-use trocar_remote::{ActionLimits, Client, Error, Value, pack, unpack};
+use trocar_remote::{Client, Error, ReplyLimits, Value, pack, unpack};
 use trocar_testing::{Allowance, PEAK, Peak, fuzz_reader};
 
 #[global_allocator]
@@ -34,7 +34,7 @@ fn damage_never_panics() {
                 let Value::Map(again) = unpack(&packed).unwrap() else { panic!("no map") };
                 assert_eq!(pack(&again).unwrap(), packed);
             }
-            ActionLimits::default().take(&value)
+            ReplyLimits::default().take(&value)
         });
         if let Err(e) = outcome {
             let line = e.to_string();

@@ -5,7 +5,7 @@ mod common;
 
 use common::{actions, array, bin, floats, map, observation, text};
 use proptest::prelude::*;
-use trocar_remote::{ActionLimits, Actions, Array, Dtype, Error, Map, Result, ServerConfig, Value, pack, unpack};
+use trocar_remote::{Actions, Array, Dtype, Error, Map, ReplyLimits, Result, ServerConfig, Value, pack, unpack};
 
 #[test]
 fn messages_survive_a_round_trip() {
@@ -44,7 +44,7 @@ proptest! {
 }
 
 /// The actions of a reply with the given limits.
-fn taken(reply: &[u8], limits: ActionLimits) -> Result<Actions> {
+fn taken(reply: &[u8], limits: ReplyLimits) -> Result<Actions> {
     unpack(reply).and_then(|reply| limits.take(&reply))
 }
 
@@ -57,7 +57,7 @@ fn named(e: &Error) -> String {
 
 #[test]
 fn chunks_may_have_every_type_of_number() {
-    let limits = ActionLimits { dim: Some(2), max_horizon: 2 };
+    let limits = ReplyLimits { dim: Some(2), max_horizon: 2 };
     let types: [(&str, Vec<u8>); 8] = [
         ("<f4", floats(&[1.0, -2.0, 3.0, 4.0])),
         (">f4", [1.0f32, -2.0, 3.0, 4.0].iter().flat_map(|v| v.to_be_bytes()).collect()),
@@ -80,7 +80,7 @@ fn chunks_may_have_every_type_of_number() {
 
 #[test]
 fn invalid_chunks_are_refused() {
-    let limits = ActionLimits { dim: Some(2), max_horizon: 2 };
+    let limits = ReplyLimits { dim: Some(2), max_horizon: 2 };
     let float = |shape: &[u8], values: &[f32]| actions(array(text("<f4"), shape, &floats(values)));
     let cases: [(&str, Vec<u8>); 21] = [
         ("NotFinite", float(&[1, 2], &[0.0, f32::NAN])),

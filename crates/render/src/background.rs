@@ -13,9 +13,9 @@ use trocar_camera::CameraModel;
 /// Number of cameras, each at one pose, of which a background is kept.
 const CAMERAS: usize = 4;
 
-/// A body is at rest after so many pictures through a camera in which it has not moved, twice as many
-/// whenever it has moved after a rest. Bodies that have not moved between the first two pictures are
-/// at rest too.
+/// A body is at rest after so many pictures through a camera in which it has not moved, twice as
+/// many whenever it has moved after a rest. Bodies that have not moved between the first two
+/// pictures are at rest too.
 const REST: u32 = 8;
 
 /// Memory for previews of a stage.

@@ -65,8 +65,8 @@ impl Buffers {
     }
 }
 
-/// Whether a lamp of the stage may cast a shadow that an eye at `eye` sees on what is at least `least`
-/// away from it (m).
+/// Whether a lamp of the stage may cast a shadow that an eye at `eye` sees on what is at least
+/// `least` away from it (m).
 pub(crate) fn may_cast(stage: &Stage, eye: Vec3A, least: f32) -> bool {
     stage.lamps().iter().any(|lamp| {
         let apart = lamp.centre().distance(eye);

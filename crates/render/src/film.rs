@@ -47,8 +47,8 @@ impl Film {
         Self { exposure: 1.0, vignette: 0.45, shoulder: 0.7, noise: None }
     }
 
-    /// The sRGB colours of pixels of a row, from pixel `first`, `v`, of a picture with linear radiance
-    /// `light`.
+    /// The sRGB colours of pixels of a row, from pixel `first`, `v`, of a picture with linear
+    /// radiance `light`.
     pub(crate) fn develop(
         &self,
         rays: &RayGenerator,

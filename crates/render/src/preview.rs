@@ -9,8 +9,8 @@ use crate::stage::Stage;
 use crate::visibility::Drawing;
 use rayon::prelude::*;
 
-/// Rows that are drawn and shaded together, a multiple of a tile's. Fewer give more clusters that are
-/// in two bands, more give less to do in parallel.
+/// Rows that are drawn and shaded together, a multiple of a tile's. Fewer give more clusters that
+/// are in two bands, more give less to do in parallel.
 const ROWS: usize = 56;
 
 /// Makes a preview. It starts with the bodies at rest, if these are kept for the camera.

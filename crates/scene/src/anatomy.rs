@@ -283,8 +283,8 @@ pub struct Tissue {
     pub law: Option<LatticeLaw>,
     /// Schedule: fast (the default solver), paper or adaptive (Vertex Block Descent).
     pub schedule: ScheduleName,
-    /// Whether tetrahedra are softer than their organ by what its mesh is too stiff, so that the organ
-    /// deflects as its material says.
+    /// Whether tetrahedra are softer than their organ by what its mesh is too stiff, so that the
+    /// organ deflects as its material says.
     pub mesh_correction: bool,
     /// Distance at which contact between organs is looked for (mm).
     pub contact_offset_mm: f64,

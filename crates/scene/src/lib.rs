@@ -40,7 +40,7 @@ pub use camera::{CellCamera, Lens, View};
 pub use cell::{Arm, ArmModel, Controller, Drive, FRANKA_FR3, Frame, GravityError, Instrument, InstrumentKind, Side};
 pub use error::{Error, Result};
 pub use expression::{
-    Comparison, Condition, MOST_MEASURES, Measure, Number, Operation, Part, Place, Target, channel_names,
+    Comparison, Condition, MAX_MEASURES, Measure, Number, Operation, Part, Place, Target, channel_names,
 };
 pub use imaging::Imaging;
 pub use phantoms::{PHANTOMS, Phantom};

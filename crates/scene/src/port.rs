@@ -70,8 +70,8 @@ impl Port {
         Pose { rotation, translation: self.centre_m.into() }
     }
 
-    /// Largest tilt of a shaft of `diameter_mm` (rad): acos(d/D), where it fills the hole (SPEC
-    /// K3); `None` for a shaft that does not fit.
+    /// Largest tilt of a shaft of `diameter_mm` (rad): acos(d/D), where it fills the hole; `None`
+    /// for a shaft that does not fit.
     pub fn tilt_limit(&self, diameter_mm: f64) -> Option<f64> {
         let share = diameter_mm / self.hole_diameter_mm;
         (share > 0.0 && share < 1.0).then(|| share.acos())

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Most entries of a list of a task; stages and aborts have fewer.
-const MOST_ENTRIES: usize = 64;
+const MAX_ENTRIES: usize = 64;
 /// Most bytes of a hint.
-const MOST_HINT: usize = 1000;
+const MAX_HINT: usize = 1000;
 
 /// What a task's expressions are about. Channels are judged anew with this and gates alone.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -209,8 +209,8 @@ impl TaskContext {
             .chain(self.constants.iter().map(|(name, value)| (format!("constants.{name}"), *value)))
             .collect();
         for (list, length) in [("stage", stages.len()), ("abort", aborts.len()), ("script", script.len())] {
-            if length > MOST_ENTRIES {
-                let reason = format!(" has {length} entries; it must have at most {MOST_ENTRIES}");
+            if length > MAX_ENTRIES {
+                let reason = format!(" has {length} entries; it must have at most {MAX_ENTRIES}");
                 return Err(TaskMistake { field: list.to_owned(), reason });
             }
         }
@@ -369,8 +369,8 @@ fn names_grasp(condition: &Condition) -> bool {
 /// The parts of a hint.
 fn hint(field: &str, text: &str, checker: &mut Checker<'_>) -> std::result::Result<Vec<HintPart>, TaskMistake> {
     let wrong = |at: usize, reason: &str| placed(field, text, 0, &Mistake::new(at, reason));
-    if text.len() > MOST_HINT {
-        return Err(wrong(0, &format!("has {} bytes; at most {MOST_HINT}", text.len())));
+    if text.len() > MAX_HINT {
+        return Err(wrong(0, &format!("has {} bytes; at most {MAX_HINT}", text.len())));
     }
     let mut parts = Vec::new();
     let mut from = 0;

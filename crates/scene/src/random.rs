@@ -20,7 +20,7 @@ impl EpisodeRandom {
         xxh3_64_with_seed(&index.to_le_bytes(), self.key)
     }
 
-    /// A number from 0 up to, without, 1 at `index`.
+    /// A uniform number in [0, 1) at `index`.
     pub fn unit(&self, index: u64) -> f64 {
         trocar_core::unit(self.bits(index))
     }

@@ -92,7 +92,7 @@ fn is_true(value: &bool) -> bool {
     *value
 }
 
-/// When the stages of the resection count as done (SPEC, stage gates), in their order.
+/// When the stages of the resection count as done, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Gates {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
 /// Longest name of a task (bytes).
-const MOST: usize = 40;
+const MAX_NAME: usize = 40;
 
 /// Tasks by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,7 +25,7 @@ pub enum TaskName {
 /// The name of a scene's own task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OwnName {
-    bytes: [u8; MOST],
+    bytes: [u8; MAX_NAME],
     length: usize,
 }
 
@@ -41,11 +41,11 @@ impl TaskName {
             return Ok(*builtin);
         }
         let legal = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
-        if name.is_empty() || name.len() > MOST || !name.chars().all(legal) {
+        if name.is_empty() || name.len() > MAX_NAME || !name.chars().all(legal) {
             let shown: String = name.chars().take(60).flat_map(char::escape_default).collect();
-            return Err(format!("is '{shown}'; it must be 1 to {MOST} lower-case letters, digits, '-' and '_'"));
+            return Err(format!("is '{shown}'; it must be 1 to {MAX_NAME} lower-case letters, digits, '-' and '_'"));
         }
-        let mut bytes = [0; MOST];
+        let mut bytes = [0; MAX_NAME];
         bytes[..name.len()].copy_from_slice(name.as_bytes());
         Ok(Self::Own(OwnName { bytes, length: name.len() }))
     }

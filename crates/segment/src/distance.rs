@@ -7,12 +7,12 @@
 /// A step of one pixel, in the unit of [`distances`].
 pub(crate) const PIXEL: u16 = 5;
 const DIAGONAL: u16 = 7;
-const FAR: u16 = u16::MAX - 2 * DIAGONAL;
+const MAX_DISTANCE: u16 = u16::MAX - 2 * DIAGONAL;
 
 /// Distance of every pixel to the nearest one of `set`, in fifths of a pixel; saturates at about
 /// 13,000 pixels. With `rim`, the outside of the image counts as set.
 pub(crate) fn distances(set: &[bool], width: usize, height: usize, rim: bool) -> Vec<u16> {
-    let mut d: Vec<u16> = set.iter().map(|s| if *s { 0 } else { FAR }).collect();
+    let mut d: Vec<u16> = set.iter().map(|s| if *s { 0 } else { MAX_DISTANCE }).collect();
     if width == 0 || height == 0 {
         return d;
     }
@@ -35,18 +35,18 @@ pub(crate) fn distances(set: &[bool], width: usize, height: usize, rim: bool) ->
 /// Propagates distances along `rows`, each from the row before it in the list, and along each row
 /// both ways. It works row by row so that the compiler can vectorise.
 fn sweep(d: &mut [u16], width: usize, rows: &[usize]) {
-    let mut before = vec![FAR; width + 2]; // with a pixel more on both sides
+    let mut before = vec![MAX_DISTANCE; width + 2]; // with a pixel more on both sides
     for &v in rows {
         let row = &mut d[v * width..(v + 1) * width];
         for (x, near) in row.iter_mut().zip(before.windows(3)) {
             *x = (*x).min(near[1] + PIXEL).min(near[0].min(near[2]) + DIAGONAL);
         }
-        let mut last = FAR;
+        let mut last = MAX_DISTANCE;
         for x in row.iter_mut() {
             last = (last + PIXEL).min(*x);
             *x = last;
         }
-        last = FAR;
+        last = MAX_DISTANCE;
         for x in row.iter_mut().rev() {
             last = (last + PIXEL).min(*x);
             *x = last;
@@ -70,7 +70,7 @@ pub(crate) fn close(set: &[bool], width: usize, height: usize, radius: f64) -> V
 
 /// A radius in the unit of [`distances`].
 fn reach(radius: f64) -> u16 {
-    (radius * f64::from(PIXEL)).clamp(0.0, f64::from(FAR - 1)) as u16
+    (radius * f64::from(PIXEL)).clamp(0.0, f64::from(MAX_DISTANCE - 1)) as u16
 }
 
 /// The pixel of `set` farthest from all other pixels, the first of several; the outside of the
@@ -100,7 +100,7 @@ mod tests {
             let ratio = f64::from(d) / 5.0 / exact.max(1e-9);
             assert!(exact == 0.0 && d == 0 || (0.985..1.08).contains(&ratio), "{d} fifths for {exact} at {i}");
         }
-        assert!(distances(&[false; 6], 3, 2, false).into_iter().all(|d| d >= FAR));
+        assert!(distances(&[false; 6], 3, 2, false).into_iter().all(|d| d >= MAX_DISTANCE));
         assert!(distances(&[], 0, 0, true).is_empty());
     }
 

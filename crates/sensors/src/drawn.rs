@@ -76,8 +76,8 @@ impl DrawnCell {
         Ok(all)
     }
 
-    /// Of `scene` around `specimen` without a cell; `arms`: model and posture of each of the scene's
-    /// arms. The organs are as recorded.
+    /// Of `scene` around `specimen` without a cell; `arms`: model and posture of each of the
+    /// scene's arms. The organs are as recorded.
     ///
     /// # Errors
     /// Shapes that cannot be read.

@@ -27,6 +27,6 @@ pub use camera::{OUTSIDE, image_circle};
 pub use drawn::{DrawnBody, DrawnCell, DrawnMesh, DrawnPart};
 pub use error::{Error, Result};
 pub use organ::BoundSurface;
-pub use rig::{CameraRig, PICTURE_SIDES, SensorNoise};
+pub use rig::{CameraNoise, CameraRig, PICTURE_SIDES};
 pub use skins::{ArmPosture, SkinnedOrgan, Skins};
 pub use trocar_camera::DepthNoise;

@@ -23,7 +23,7 @@ pub const PICTURE_SIDES: std::ops::RangeInclusive<usize> = 8..=8192;
 
 /// Noise of the sensors; none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SensorNoise {
+pub struct CameraNoise {
     /// Colour noise: standard deviation of the shot noise at white, and of the read noise. Typical
     /// values are 0.015 and 0.003.
     pub color: Option<[f32; 2]>,
@@ -58,7 +58,7 @@ pub struct CameraRig {
     /// See [`drawn_part`]; `None` for a specimen alone.
     scene: Option<Box<Scene>>,
     /// Noise of the sensors.
-    pub noise: SensorNoise,
+    pub noise: CameraNoise,
 }
 
 impl CameraRig {
@@ -76,8 +76,8 @@ impl CameraRig {
         Ok(made)
     }
 
-    /// Builds the cameras of `scene` for recorded surfaces, see [`show`](Self::show). `arms` has the
-    /// model and a posture of each arm.
+    /// Builds the cameras of `scene` for recorded surfaces, see [`show`](Self::show). `arms` has
+    /// the model and a posture of each arm.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -140,7 +140,7 @@ impl CameraRig {
     }
 
     fn with(visible: CellStage, cameras: Vec<RigCamera>) -> Self {
-        Self { cameras, visible, picture: Picture::default(), scene: None, noise: SensorNoise::default() }
+        Self { cameras, visible, picture: Picture::default(), scene: None, noise: CameraNoise::default() }
     }
 
     /// Updates the stage to the current state of the cell. [`Self::render`] does this itself.
@@ -275,8 +275,8 @@ impl CameraRig {
         Ok(&self.picture)
     }
 
-    /// Frees what is kept of earlier pictures, see [`trocar_render::render_into`]. The next ones are
-    /// made from nothing and are the same.
+    /// Frees what is kept of earlier pictures, see [`trocar_render::render_into`]. The next ones
+    /// are made from nothing and are the same.
     pub fn forget_pictures(&mut self) {
         self.visible.stage.forget_pictures();
     }

@@ -1,5 +1,5 @@
-//! The drawn surfaces of a specimen's organs and the postures of the arms: what moves in pictures of
-//! a cell. They need no renderer, so that they are also recorded and sent.
+//! The drawn surfaces of a specimen's organs and the postures of the arms: what moves in pictures
+//! of a cell. They need no renderer, so that they are also recorded and sent.
 
 use crate::organ::{BoundSurface, OrganSkin, Piece};
 use crate::{Error, Result};
@@ -59,8 +59,8 @@ impl SkinnedOrgan {
         &self.recorded.name
     }
 
-    /// Triangles and colours. Its vertices are those of the rest pose (m). After a cut it is another
-    /// mesh.
+    /// Triangles and colours. Its vertices are those of the rest pose (m). After a cut it is
+    /// another mesh.
     pub fn mesh(&self) -> &TriMesh {
         &self.surface.mesh
     }
@@ -191,7 +191,8 @@ impl Skins {
         Ok(all_same)
     }
 
-    /// Shows recorded surfaces: for each organ its mesh, if it is another one, and its positions (m).
+    /// Shows recorded surfaces: for each organ its mesh, if it is another one, and its positions
+    /// (m).
     ///
     /// # Errors
     /// Another number of organs or of positions.

@@ -10,7 +10,7 @@ use trocar_core::Pose;
 use trocar_geometry::{TetMesh, TriMesh};
 use trocar_render::{Picture, RenderSettings};
 use trocar_scene::{Scene, SpecimenSource};
-use trocar_sensors::{CameraRig, DepthNoise, SensorNoise};
+use trocar_sensors::{CameraNoise, CameraRig, DepthNoise};
 use trocar_specimen::{Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 
 /// A bar of cubes along x, six elements each, in the frame of the recording camera, on a bed at a
@@ -83,7 +83,7 @@ fn every_camera_sees_the_scene_independent_of_threads() {
     let (scene, specimen) = (scene(), specimen());
     let mut cell = Cell::new(&scene, &specimen, 1).unwrap();
     let mut rig = CameraRig::new(&scene, &specimen, &cell).unwrap();
-    rig.noise = SensorNoise { color: Some([0.02, 0.004]), depth: Some(DepthNoise::default()), seed: 7 };
+    rig.noise = CameraNoise { color: Some([0.02, 0.004]), depth: Some(DepthNoise::default()), seed: 7 };
     assert_eq!(rig.cameras(), ["endoscope", "d405", "recording", "outside"]);
     rig.update(&cell).unwrap();
     let mut run = |threads: usize| -> Vec<Picture> {
@@ -114,7 +114,7 @@ fn every_camera_sees_the_scene_independent_of_threads() {
     }
     assert!(share(&one[6], label(&rig, "left arm")) > 0.01);
     // Without noise, depth is exact: the bed is 150 mm in front of the recording camera.
-    rig.noise = SensorNoise::default();
+    rig.noise = CameraNoise::default();
     let size = rig.size("recording").unwrap();
     let picture = rig.render(&cell, "recording", size, &RenderSettings::preview()).unwrap();
     let bed = picture.depth.depth[100 * size[0] + 20];
@@ -199,7 +199,7 @@ fn imaging_changes_pictures_as_it_says() {
         change(&mut scene.imaging);
         let mut rig = CameraRig::new(&scene, &specimen, &cell).unwrap();
         assert!(rig.is_of(&scene) && (scene == plain || !rig.is_of(&plain)));
-        rig.noise = SensorNoise { color: Some([0.02, 0.004]), depth: Some(DepthNoise::default()), seed: 7 };
+        rig.noise = CameraNoise { color: Some([0.02, 0.004]), depth: Some(DepthNoise::default()), seed: 7 };
         let organ = label(&rig, "appendix");
         let picture = rig.render(&cell, "d405", [96, 64], &RenderSettings::preview()).unwrap().clone();
         let on = |all: bool, channel: usize| -> f64 {

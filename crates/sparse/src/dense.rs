@@ -1,9 +1,9 @@
 //! Dense kernels over tiles.
 //!
 //! A band is a row of tiles: `LANES` rows of a matrix, stored column by column, so that a column of
-//! a band is one vector. Bands follow each other. Every number of a result is a sum over the columns
-//! in ascending order, multiplied and added apart: the bits do not depend on the CPU, on the width
-//! of the kernel or on the number of threads.
+//! a band is one vector. Bands follow each other. Every number of a result is a sum over the
+//! columns in ascending order, multiplied and added apart: the bits do not depend on the CPU, on
+//! the width of the kernel or on the number of threads.
 
 use crate::Real;
 use fearless_simd::{Level, Simd, SimdBase, dispatch};

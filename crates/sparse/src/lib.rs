@@ -3,8 +3,8 @@
 //!
 //! [`BlockMatrix`] is the matrix, [`Cholesky`] its factor. An elimination order is found by nested
 //! dissection once for a pattern, and numbers follow as often as needed. Independent subtrees and
-//! large fronts share the threads of the rayon pool that calls. The bits of a factor depend neither on
-//! the number of threads nor on the instruction set.
+//! large fronts share the threads of the rayon pool that calls. The bits of a factor depend neither
+//! on the number of threads nor on the instruction set.
 
 mod cholesky;
 mod dense;

@@ -53,8 +53,8 @@ impl BlockMatrix {
         self.blocks.fill(DMat3::ZERO);
     }
 
-    /// Adds a block at nodes (i, j). Of (i, j) and (j, i) one is kept, so both must be added. Blocks
-    /// on the diagonal are made symmetric; blocks outside the pattern are dropped.
+    /// Adds a block at nodes (i, j). Of (i, j) and (j, i) one is kept, so both must be added.
+    /// Blocks on the diagonal are made symmetric; blocks outside the pattern are dropped.
     pub fn add(&mut self, i: u32, j: u32, block: DMat3) {
         if i < j {
             return;

@@ -16,8 +16,9 @@ const MAX_OVERLAP: f64 = 1e-3;
 impl Specimen {
     /// This specimen with the organ `name` of `other` in the place of its own: the ends at the base
     /// are at the same place seen from above, the middles in the same direction from it, and the
-    /// lowest points at the same height. Where the organ would then lie in another one, it is turned
-    /// about the vertical through its base, by as little as is enough, and at most 60 degrees.
+    /// lowest points at the same height. Where the organ would then lie in another one, it is
+    /// turned about the vertical through its base, by as little as is enough, and at most 60
+    /// degrees.
     ///
     /// # Errors
     /// A specimen without that organ; an organ that lies in another one, however it is turned.
@@ -122,7 +123,8 @@ fn moved(organ: &Organ, pose: &Pose) -> Organ {
     moved
 }
 
-/// How deep nodes of `organ` lie in each of the others, or theirs in it (m); 0 where they are apart.
+/// How deep nodes of `organ` lie in each of the others, or theirs in it (m); 0 where they are
+/// apart.
 fn overlaps(organ: &Organ, others: &[(&Organ, MeshDistance)]) -> Result<Vec<f64>> {
     let own = MeshDistance::new(&organ.surface)?;
     let one = |(other, surface): &(&Organ, MeshDistance)| {

@@ -2,7 +2,7 @@
 //! functions of these rows alone.
 
 use serde::Serialize;
-use trocar_scene::MOST_MEASURES;
+use trocar_scene::MAX_MEASURES;
 
 /// Declares a struct of numbers with their names in order.
 macro_rules! row {
@@ -103,7 +103,7 @@ row! {
         jaw_force_n,
         /// The jaws hold tissue of any organ.
         attached,
-        /// The task's organ is in the mouth (SPEC C3).
+        /// The task's organ is in the mouth.
         in_mouth,
         /// Share of the wedge between the blades that it fills.
         mouth_share,
@@ -147,7 +147,7 @@ row! {
         position_mm,
         /// Jaw opening of the cutter.
         cut_jaw,
-        /// The cutter's mouth has tissue of the organ in it (SPEC C3).
+        /// The cutter's mouth has tissue of the organ in it.
         cut_mouth,
         /// Share of the cutter's wedge that it fills.
         cut_share,
@@ -178,7 +178,8 @@ row! {
         diverged,
         /// Times that an instrument punctured an organ in the period.
         punctures,
-        /// Times that the axis of an instrument came into an organ with less force than punctures it.
+        /// Times that the axis of an instrument came into an organ with less force than punctures
+        /// it.
         pierced,
         /// Times that an instrument began to strain tissue beyond what tissue bears.
         overstretched,
@@ -203,7 +204,7 @@ pub struct Channels {
     pub task: TaskChannels,
     /// What the task measures beside, in the order of its
     /// [`Program`](trocar_scene::Program); zeros after.
-    pub measures: [f64; MOST_MEASURES],
+    pub measures: [f64; MAX_MEASURES],
 }
 
 impl Channels {
@@ -252,7 +253,7 @@ impl Channels {
         let time_s = from.next()?;
         let (left, right) = (ArmChannels::take(&mut from)?, ArmChannels::take(&mut from)?);
         let task = TaskChannels::take(&mut from)?;
-        let made = Self { time_s, left, right, task, measures: [0.0; MOST_MEASURES] };
+        let made = Self { time_s, left, right, task, measures: [0.0; MAX_MEASURES] };
         from.next().is_none().then_some(made)
     }
 

@@ -16,7 +16,7 @@ use trocar_specimen::Specimen;
 use xxhash_rust::xxh3::Xxh3;
 
 /// How long organs settle under gravity before any episode begins (s): all phantoms are at rest
-/// within it (SPEC, settled).
+/// within it.
 pub const SETTLE_S: f64 = 1.0;
 
 /// What a step gives.

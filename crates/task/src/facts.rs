@@ -150,8 +150,9 @@ impl Facts<'_> {
         Some(severed)
     }
 
-    /// For a grasp that slipped and whose design presses, a sentence on the jaw force that would bear the
-    /// organ's weight. None for designs that tie nodes, which no force of the jaws makes hold.
+    /// For a grasp that slipped and whose design presses, a sentence on the jaw force that would
+    /// bear the organ's weight. None for designs that tie nodes, which no force of the jaws makes
+    /// hold.
     pub fn advice(&self) -> Option<String> {
         let presses = matches!(self.task.grasp, GraspDesignName::Friction | GraspDesignName::Compliant);
         if !presses {

@@ -23,14 +23,14 @@ impl Memory {
 
 /// A row, those up to it, and the task's constants.
 #[derive(Clone, Copy)]
-pub(crate) struct Sight<'a> {
+pub(crate) struct Context<'a> {
     pub row: &'a Channels,
     /// For hints; empty otherwise.
     pub rows: &'a [Channels],
     pub constants: &'a [(String, f64)],
 }
 
-impl Sight<'_> {
+impl Context<'_> {
     /// Whether `condition` holds in this row. Every part of it is looked at in every row, so that
     /// what it remembers does not depend on the other parts.
     pub fn holds(&self, condition: &Condition, memory: &mut Memory) -> bool {
@@ -138,7 +138,7 @@ impl Sight<'_> {
     }
 
     fn over_rows<'b>(&'b self, of: &'b Number) -> impl Iterator<Item = f64> + 'b {
-        self.rows.iter().map(move |row| Sight { row, rows: &[], ..*self }.value(of, &mut Memory::default()))
+        self.rows.iter().map(move |row| Context { row, rows: &[], ..*self }.value(of, &mut Memory::default()))
     }
 
     /// A hint as a sentence.
@@ -177,8 +177,8 @@ mod tests {
         let program = program(when);
         let stage = &program.stages[0];
         let mut memory = Memory::new(stage.timers, stage.marks);
-        let sight = |row| Sight { row, rows: &[], constants: &program.constants };
-        rows.iter().map(|row| sight(row).holds(&stage.when, &mut memory)).collect()
+        let context = |row| Context { row, rows: &[], constants: &program.constants };
+        rows.iter().map(|row| context(row).holds(&stage.when, &mut memory)).collect()
     }
 
     fn lifts(all: &[f64]) -> Vec<Channels> {

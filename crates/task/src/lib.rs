@@ -36,7 +36,7 @@ pub use end::End;
 pub use episode::{Episode, EpisodeState, SETTLE_S, Step};
 pub use error::{Error, Result};
 pub use facts::{Details, Severed};
-pub use observation::{ArmState, Observation, STATE_NAMES, STATE_SIZE, privileged};
+pub use observation::{ArmState, Observation, STATE_NAMES, STATE_SIZE};
 pub use policy::Policy;
 pub use prompt::prompt;
 pub use replay::{EpisodeFile, Header, Verdict, scene_hash};

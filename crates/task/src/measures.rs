@@ -8,7 +8,7 @@ use glam::DVec3;
 use std::sync::Arc;
 use trocar_camera::Camera;
 use trocar_cell::Cell;
-use trocar_scene::{MOST_MEASURES, Measure, Part, Place, Scene, Side, Target};
+use trocar_scene::{MAX_MEASURES, Measure, Part, Place, Scene, Side, Target};
 
 /// The measures of a task, and where what moves was at the episode's start (m, cell).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -42,7 +42,7 @@ impl Measures {
 
     /// Fills the measures of `row`.
     pub fn measure(&self, cell: &Cell, row: &mut Channels) -> Result<()> {
-        let mut all = [0.0; MOST_MEASURES];
+        let mut all = [0.0; MAX_MEASURES];
         let mut views = self.views.iter();
         for ((value, measure), origin) in all.iter_mut().zip(&self.list).zip(&self.origins) {
             *value = match measure {

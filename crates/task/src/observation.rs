@@ -1,11 +1,11 @@
-//! What a policy sees (SPEC, state observation): named fields, and the same as a flat vector.
+//! What a policy sees: named fields, and the same as a flat vector.
 
+use crate::Progress;
 use crate::measure::upright;
-use crate::{Channels, Progress};
 use serde::Serialize;
 use trocar_cell::ArmObservation;
 use trocar_robot::wrench::ForceKind;
-use trocar_scene::{Program, Side};
+use trocar_scene::Side;
 
 /// What is seen of one arm; all zero where the scene has no such arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -141,13 +141,6 @@ impl Observation {
         all.push(self.stage);
         all
     }
-}
-
-/// Privileged figures of a step, for `info` alone: the channels and what `program` measures beside,
-/// by name.
-pub fn privileged(row: &Channels, program: &Program) -> Vec<(String, f64)> {
-    let measures = program.measures.iter().map(ToString::to_string).zip(row.measures);
-    Channels::names().into_iter().zip(row.to_row()).chain(measures).collect()
 }
 
 #[cfg(test)]

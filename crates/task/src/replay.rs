@@ -15,15 +15,15 @@ use trocar_specimen::{Specimen, parse_toml};
 use xxhash_rust::xxh3::xxh3_64;
 
 const FORMAT: &str = "trocar-episode";
-/// Version 1 has no drawn values; the hashes of version 2 are of the text of an arm's state; version
-/// 3 is of contact of vertices alone, without instruments against solids; rules of version 4 switch
-/// contact off.
+/// Version 1 has no drawn values; the hashes of version 2 are of the text of an arm's state;
+/// version 3 is of contact of vertices alone, without instruments against solids; rules of version
+/// 4 switch contact off.
 const VERSION: u32 = 5;
 
 /// Largest file (bytes): a million steps.
-const MOST_BYTES: u64 = 100 << 20;
+const MAX_BYTES: u64 = 100 << 20;
 /// Longest header line (bytes).
-const MOST_HEADER: usize = 4 << 20;
+const MAX_HEADER: usize = 4 << 20;
 /// Numbers of an arm in an action.
 const NUMBERS: usize = 5;
 
@@ -183,8 +183,8 @@ impl EpisodeFile {
     pub fn read(path: &Path) -> Result<Self> {
         let io = |source| Error::Io { path: path.to_owned(), source };
         let length = std::fs::metadata(path).map_err(io)?.len();
-        if length > MOST_BYTES {
-            let reason = format!("has {length} bytes; at most {MOST_BYTES} are read");
+        if length > MAX_BYTES {
+            let reason = format!("has {length} bytes; at most {MAX_BYTES} are read");
             return Err(Error::Invalid { path: path.to_owned(), reason });
         }
         let bytes = std::fs::read(path).map_err(io)?;
@@ -196,7 +196,7 @@ impl EpisodeFile {
     /// # Errors
     /// A sentence without the file's name.
     pub fn parse(bytes: &[u8]) -> std::result::Result<Self, String> {
-        let end = bytes.iter().take(MOST_HEADER).position(|b| *b == b'\n');
+        let end = bytes.iter().take(MAX_HEADER).position(|b| *b == b'\n');
         let end = end.ok_or("is no episode file: it has no header line")?;
         let line: Line = serde_json::from_slice(&bytes[..end]).map_err(|e| format!("its header is damaged: {e}"))?;
         if line.format != FORMAT || line.version != VERSION {

@@ -1,15 +1,16 @@
 //! The stages of a task as functions of the channels: nothing but rows, gates and constants decides
-//! (SPEC, stage gates).
+//! (`docs/guides/tasks.md`).
 //!
 //! Stages stay passed. They pass in their order, unless the task says any.
 
-use crate::judge::{Memory, Sight};
+use crate::judge::{Context, Memory};
 use crate::{Channels, Error, Result};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use trocar_scene::{Program, StageOrder};
 
-/// A grasp has held with at least this follow ratio at the top of the lift (SPEC, held) ...
+/// A grasp has held with at least this follow ratio at the top of the lift (`docs/glossary.md`,
+/// held) ...
 pub const HELD_FOLLOW: f64 = 0.80;
 /// ... and less slip than this (mm).
 pub const HELD_SLIP_MM: f64 = 3.0;
@@ -127,10 +128,10 @@ impl Tracker {
     /// Whether the stage at `place`, which has not passed, passes in this row.
     fn judge(&mut self, place: usize, row: &Channels) -> bool {
         let (stage, memory) = (&self.program.stages[place], &mut self.memories[place]);
-        let sight = Sight { row, rows: &[], constants: &self.program.constants };
-        let passed = sight.holds(&stage.when, memory);
+        let context = Context { row, rows: &[], constants: &self.program.constants };
+        let passed = context.holds(&stage.when, memory);
         // Only what has passed is 1.
-        let share = if passed { 1.0 } else { part(sight.value(&stage.progress, memory)) };
+        let share = if passed { 1.0 } else { part(context.value(&stage.progress, memory)) };
         let now = &mut self.progress.stages[place];
         (now.passed, now.share) = (passed, share);
         if passed {
@@ -143,10 +144,15 @@ impl Tracker {
 
     /// Name of the first abort that holds in this row; to be asked once a row.
     pub fn aborted(&mut self, row: &Channels) -> Option<String> {
-        let sight = Sight { row, rows: &[], constants: &self.program.constants };
+        let context = Context { row, rows: &[], constants: &self.program.constants };
         let memories = &mut self.memories[self.program.stages.len()..];
-        let all: Vec<bool> =
-            self.program.aborts.iter().zip(memories).map(|(abort, memory)| sight.holds(&abort.when, memory)).collect();
+        let all: Vec<bool> = self
+            .program
+            .aborts
+            .iter()
+            .zip(memories)
+            .map(|(abort, memory)| context.holds(&abort.when, memory))
+            .collect();
         all.iter().position(|holds| *holds).map(|k| self.program.aborts[k].name.clone())
     }
 

@@ -39,9 +39,9 @@ fn name_in(version: u32, name: &str) -> Option<String> {
 }
 
 /// Most rows of a file: nine hours.
-const MOST_ROWS: usize = 1_000_000;
+const MAX_ROWS: usize = 1_000_000;
 /// Largest file (bytes).
-const MOST_BYTES: u64 = 1 << 31;
+const MAX_BYTES: u64 = 1 << 31;
 
 /// What a file of channels says of itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -102,8 +102,8 @@ impl ChannelsInfo {
     }
 }
 
-/// A column beside the channels, with a number a row: what is known of an episode and no part of it.
-/// Readers of channels pass over it.
+/// A column beside the channels, with a number a row: what is known of an episode and no part of
+/// it. Readers of channels pass over it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     /// Its name, which no channel has.
@@ -201,8 +201,8 @@ pub fn read_channels(path: &Path) -> Result<(ChannelsInfo, Vec<Channels>)> {
     let invalid = |reason: String| Error::Invalid { path: path.to_owned(), reason };
     let file = std::fs::File::open(path).map_err(io)?;
     let length = file.metadata().map_err(io)?.len();
-    if length > MOST_BYTES {
-        return Err(invalid(format!("has {length} bytes; at most {MOST_BYTES} are read")));
+    if length > MAX_BYTES {
+        return Err(invalid(format!("has {length} bytes; at most {MAX_BYTES} are read")));
     }
     // The decoder is not ours: what it trips over is a bad file, too.
     catch_unwind(AssertUnwindSafe(|| decode(file)))
@@ -223,8 +223,8 @@ fn decode(file: std::fs::File) -> std::result::Result<(ChannelsInfo, Vec<Channel
         return Err(format!("is {format} version {version}; {FORMAT} versions 1 to {VERSION} are read"));
     }
     let count = usize::try_from(metadata.file_metadata().num_rows()).unwrap_or(usize::MAX);
-    if count != stored.rows || count > MOST_ROWS {
-        return Err(format!("has {count} rows where {} were written (at most {MOST_ROWS})", stored.rows));
+    if count != stored.rows || count > MAX_ROWS {
+        return Err(format!("has {count} rows where {} were written (at most {MAX_ROWS})", stored.rows));
     }
     let columns = metadata.file_metadata().schema_descr().columns();
     let mut table = vec![Vec::with_capacity(Channels::COUNT); count];

@@ -1,4 +1,4 @@
-//! Gate sweeps: stored channels judged anew over thresholds, without simulating (SPEC E2).
+//! Gate sweeps: stored channels judged again over thresholds, without simulating.
 //!
 //! An episode ends when it has passed all its stages at the scene's gates, so stricter gates see no
 //! more of it than there was: a count at a stricter gate is what is shown, not what might have
@@ -14,8 +14,8 @@ use trocar_scene::TaskName;
 /// Steps of a range that says none.
 const STEPS: f64 = 8.0;
 /// Most values of one gate, and most combinations.
-const MOST_VALUES: usize = 1000;
-const MOST_ROWS: usize = 10_000;
+const MAX_VALUES: usize = 1000;
+const MAX_COMBINATIONS: usize = 10_000;
 
 /// One gate and the values that it takes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -53,13 +53,13 @@ impl GateRange {
                     return Err(wrong("must rise by steps above 0"));
                 }
                 let count = ((high - low) / step + 1e-9).floor() + 1.0;
-                if count > MOST_VALUES as f64 {
+                if count > MAX_VALUES as f64 {
                     return Err(wrong("has more than 1000 values"));
                 }
                 (0..count as usize).map(|k| low + step * k as f64).collect()
             }
         };
-        if values.is_empty() || values.len() > MOST_VALUES {
+        if values.is_empty() || values.len() > MAX_VALUES {
             return Err(wrong("has no value, or more than 1000"));
         }
         Ok(Self { gate: gate.trim().to_owned(), values })
@@ -116,9 +116,10 @@ pub fn sweep(
         let (a, b) = (task.name(), info.task.name());
         return Err(Error::Option(format!("channels of different tasks, {a} and {b}; sweep one task at a time")));
     }
-    let count = ranges.iter().try_fold(1_usize, |n, r| n.checked_mul(r.values.len()).filter(|n| *n <= MOST_ROWS));
     let count =
-        count.ok_or_else(|| Error::Option(format!("more than {MOST_ROWS} combinations; sweep fewer values")))?;
+        ranges.iter().try_fold(1_usize, |n, r| n.checked_mul(r.values.len()).filter(|n| *n <= MAX_COMBINATIONS));
+    let count =
+        count.ok_or_else(|| Error::Option(format!("more than {MAX_COMBINATIONS} combinations; sweep fewer values")))?;
     let programs = episodes.iter().map(|(info, _)| info.program()).collect::<Result<Vec<_>>>()?;
     let stages: Vec<String> = programs[0].stages.iter().map(|s| s.name.clone()).collect();
     for (program, (info, _)) in programs.iter().zip(episodes) {

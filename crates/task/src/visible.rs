@@ -14,8 +14,8 @@ use trocar_tissue::Body;
 /// Width of the picture (px); its height follows from the camera.
 const WIDTH: usize = 192;
 
-/// An instrument hides what is behind it: this far to either side of its axis, and this far from the
-/// pivot of its jaws back along the shaft and forward along the closed blades (m). Its axis is
+/// An instrument hides what is behind it: this far to either side of its axis, and this far from
+/// the pivot of its jaws back along the shaft and forward along the closed blades (m). Its axis is
 /// drawn in so many pieces, and those behind the camera are left out.
 const HALF_SHAFT: f64 = 0.0025;
 const SHAFT: f64 = 0.12;

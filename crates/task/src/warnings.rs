@@ -11,8 +11,8 @@ use std::iter::Sum;
 pub struct Warnings {
     /// Times that an instrument punctured an organ.
     pub punctures: usize,
-    /// Times that the axis of an instrument came into an organ that its jaws did not hold, with less
-    /// force than punctures it.
+    /// Times that the axis of an instrument came into an organ that its jaws did not hold, with
+    /// less force than punctures it.
     pub pierced: usize,
     /// Times that an instrument began to strain tissue beyond what tissue bears.
     pub overstretched: usize,

@@ -1,7 +1,7 @@
 //! Why an episode did not pass, in one line.
 
 use crate::facts::Facts;
-use crate::judge::Sight;
+use crate::judge::Context;
 use crate::{Channels, End, Progress};
 use trocar_cell::CellEvent;
 use trocar_scene::Side;
@@ -43,7 +43,7 @@ impl Reason<'_, '_> {
                 return self.lost_grasp();
             }
         }
-        Sight { row: &last, rows: self.rows, constants: &program.constants }.said(&stage.hint)
+        Context { row: &last, rows: self.rows, constants: &program.constants }.said(&stage.hint)
     }
 
     /// The jaws never held the organ where the gate wants it.

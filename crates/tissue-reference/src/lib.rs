@@ -4,8 +4,8 @@
 //! [`Oracle`] finds the step of implicit Euler and the static equilibrium to double precision,
 //! slowly, also in contact with tools and between bodies. [`SemiImplicit`] and [`Xpbd`] are the
 //! methods that the paper compares with, each in its best known form. [`Scheme`] puts all of them
-//! behind a [`trocar_tissue::Stepper`]. [`statics`] finds equilibria by other elements. Only studies, tests and recorded phantom lifts link this
-//! crate.
+//! behind a [`trocar_tissue::Stepper`]. [`statics`] finds equilibria by other elements. Only
+//! studies, tests and recorded phantom lifts link this crate.
 //!
 //! The comparators advance the same body as the implicit solvers do (masses, energies, dashpots and
 //! support planes as the model holds them), but in double precision within a frame: their steps are

@@ -109,8 +109,8 @@ impl Client {
         self.news.notify_one();
     }
 
-    /// Puts a frame into its slot, in the place of one that it has not got. One that comes too early
-    /// for the client's rate waits there: it may be the last for a while.
+    /// Puts a frame into its slot, in the place of one that it has not got. One that comes too
+    /// early for the client's rate waits there: it may be the last for a while.
     pub fn offer(&self, frame: &Arc<Frame>, now: Instant) {
         let mut outbox = lock(&self.outbox);
         if outbox.wants.frames_hz <= 0.0 || outbox.closed {
@@ -198,7 +198,8 @@ fn period(hz: f64) -> Duration {
     Duration::from_secs_f64(1.0 / hz)
 }
 
-/// Whether something that happens `hz` times a second is due, with half a period of slack for jitter.
+/// Whether something that happens `hz` times a second is due, with half a period of slack for
+/// jitter.
 fn is_due(due: &mut Option<Instant>, hz: f64, now: Instant) -> bool {
     let period = period(hz);
     let next = due.unwrap_or(now);

@@ -41,7 +41,8 @@ pub(crate) fn names(own: &str) -> Vec<String> {
     all
 }
 
-/// The policy of that name for `episode`. With `lift` the scripted one is that of `trocar simulate`.
+/// The policy of that name for `episode`. With `lift` the scripted one is that of
+/// `trocar simulate`.
 ///
 /// # Errors
 /// A name that is none, a server that does not answer.

@@ -18,7 +18,7 @@ const INPUT_FILE: &str = "input.jsonl";
 /// Who moved each arm in each control period.
 const ACTORS_FILE: &str = "actors.csv";
 /// The most inputs that an episode keeps: ten minutes of two devices at 500 Hz.
-const MOST_INPUTS: usize = 600_000;
+const MAX_INPUTS: usize = 600_000;
 
 /// A folder of demonstrations, and the input of the episode that runs.
 pub(crate) struct Recorder {
@@ -39,7 +39,7 @@ impl Recorder {
     /// Takes the input that has arrived; `time_s` is the simulated time (s).
     pub fn take(&mut self, hub: &Hub, time_s: f64) {
         for (arm, arrived) in hub.take_raw() {
-            if self.input.len() < MOST_INPUTS {
+            if self.input.len() < MAX_INPUTS {
                 self.input.push(line(arm, &arrived, time_s, hub.wall_s(arrived.at)).to_string());
             }
         }

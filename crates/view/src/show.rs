@@ -112,8 +112,8 @@ impl Show {
         self.readings.note(&self.episode);
     }
 
-    /// Begins the live episode of `seed` by the policy of that name; `records` tells whether it may be
-    /// kept.
+    /// Begins the live episode of `seed` by the policy of that name; `records` tells whether it may
+    /// be kept.
     ///
     /// # Errors
     /// A policy that is none or cannot begin, an episode that cannot be built; the show stays as it

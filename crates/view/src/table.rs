@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use trocar_task::{EPISODE_FILE, RESULT_FILE};
 
 /// Most episodes of a table.
-const MOST: usize = 20_000;
+const MAX_EPISODES: usize = 20_000;
 
 /// The message `table` where there is none.
 pub(crate) fn no_episodes(number: Option<i64>) -> Value {
@@ -73,7 +73,7 @@ impl Folder {
     }
 
     fn rows(&self) -> Vec<Value> {
-        let mut rows: Vec<Value> = self.names().into_iter().take(MOST).map(|id| self.row(&id)).collect();
+        let mut rows: Vec<Value> = self.names().into_iter().take(MAX_EPISODES).map(|id| self.row(&id)).collect();
         rows.sort_by_key(|row| row["passed"].as_bool().unwrap_or(false));
         rows
     }

@@ -16,8 +16,8 @@ use trocar_view::{Building, Options, Server, Source};
 const SECONDS: Duration = Duration::from_secs(60);
 /// Clients that read nothing, with two that do the most that are served.
 const HOSTILE: usize = 14;
-/// By how much the memory may grow: for each client 8 MiB of replies, and as much again for the scene's
-/// message while it is sent, threads and frames.
+/// By how much the memory may grow: for each client 8 MiB of replies, and as much again for the
+/// scene's message while it is sent, threads and frames.
 const BOUND: u64 = HOSTILE as u64 * (16 << 20);
 /// How long the hostile ones ask: within the four seconds for which a message is tried to be sent.
 const ASKING: Duration = Duration::from_secs(3);
@@ -92,7 +92,8 @@ fn hostile_clients_do_not_fill_the_memory() {
     let (clock, mut most) = (Instant::now(), 0);
     while clock.elapsed() < ASKING {
         for stream in &mut hostile {
-            // A part of a message that is left out ends the connection, which is none of the others'.
+            // A part of a message that is left out ends the connection, which is none of the
+            // others'.
             let _ = stream.write(&history);
         }
         while client.receive(Duration::ZERO).unwrap().is_some() {}

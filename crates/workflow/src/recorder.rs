@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use trocar_camera::ColorImage;
 use trocar_cell::{Cell, CellEvent};
 use trocar_render::RenderSettings;
-use trocar_sensors::{CameraRig, DepthNoise, SensorNoise};
+use trocar_sensors::{CameraNoise, CameraRig, DepthNoise};
 use trocar_task::{Episode, Step};
 
 /// Sizes of stills and video (px). Both are rendered at twice the size and averaged.
@@ -128,7 +128,7 @@ impl Recorder {
         if let Some(depth) = self.depth.clone() {
             let picture = self.rig.render(cell, &depth, STILL_SIZE.map(|n| 2 * n), &RenderSettings::preview())?;
             self.stills.push((format!("{depth} at the end"), averaged(&picture.color, 2)));
-            self.rig.noise = SensorNoise { depth: Some(DepthNoise::default()), ..SensorNoise::default() };
+            self.rig.noise = CameraNoise { depth: Some(DepthNoise::default()), ..CameraNoise::default() };
             let picture = self.rig.render(cell, &depth, STILL_SIZE, &RenderSettings::Preview { shadows: false })?;
             self.stills.push((format!("Depth of {depth} with its noise, near is bright"), shown(&picture.depth)));
         }

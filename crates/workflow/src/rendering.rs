@@ -21,7 +21,7 @@ use trocar_camera::ColorImage;
 use trocar_core::Progress;
 use trocar_render::{Picture, RenderSettings};
 use trocar_scene::Scene;
-use trocar_sensors::{CameraRig, DepthNoise, OUTSIDE, PICTURE_SIDES, SensorNoise};
+use trocar_sensors::{CameraNoise, CameraRig, DepthNoise, OUTSIDE, PICTURE_SIDES};
 use trocar_specimen::Specimen;
 use trocar_task::{EPISODE_FILE, EpisodeFile};
 
@@ -189,7 +189,7 @@ impl Rendering {
 
     fn with_noise(&self, mut rig: CameraRig) -> CameraRig {
         if self.noise {
-            rig.noise = SensorNoise { color: Some([0.015, 0.003]), depth: Some(DepthNoise::default()), seed: 1 };
+            rig.noise = CameraNoise { color: Some([0.015, 0.003]), depth: Some(DepthNoise::default()), seed: 1 };
         }
         rig
     }

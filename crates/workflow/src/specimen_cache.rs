@@ -74,8 +74,8 @@ impl SpecimenCache {
         Ok(())
     }
 
-    /// Whether the specimen that `source` names need not be made: it is a folder, or its phantom has
-    /// been made.
+    /// Whether the specimen that `source` names need not be made: it is a folder, or its phantom
+    /// has been made.
     pub fn is_made(&self, source: &SpecimenSource) -> bool {
         is_made(source, &self.phantoms)
     }

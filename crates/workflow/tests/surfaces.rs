@@ -220,7 +220,8 @@ fn surfaces_give_what_was_seen() {
     let said = refused("\"version\":1", "\"version\":9");
     assert!(said.contains("version 9; trocar-surfaces version 1 is read"), "{said}");
 
-    // Damaged bytes are an error at once; with a checksum that fits they are one when they are read.
+    // Damaged bytes are an error at once; with a checksum that fits they are one when they are
+    // read.
     for k in 0..60 {
         let mut damaged = bytes[..bytes.len() - 8].to_vec();
         let at = line + 1 + (k * 7919) % (damaged.len() - line - 1);

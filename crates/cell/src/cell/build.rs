@@ -223,8 +223,8 @@ pub(super) fn start(start: &Start, port: Option<&trocar_scene::Port>, workspace:
 }
 
 /// The range of roll (rad) that an arm reaches from its start within its joint limits, at any tilt
-/// of the shaft up to [`LEAN`]: the wrist's range less the part that the tilt uses. Tilts that the arm
-/// cannot reach even at the start's roll are left out: commands there are held back.
+/// of the shaft up to [`LEAN`]: the wrist's range less the part that the tilt uses. Tilts that the
+/// arm cannot reach even at the start's roll are left out: commands there are held back.
 fn roll_of(
     arm: &SerialArm,
     port: &Port,

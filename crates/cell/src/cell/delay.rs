@@ -33,12 +33,14 @@ impl Waiting {
 
     /// Every number of it, for the hash; none where nothing waits.
     pub fn numbers(&self) -> impl Iterator<Item = f64> {
-        let one = |action: &Option<Action>| {
-            let space = action.as_ref().map_or(0.0, |a| 1.0 + f64::from(u8::from(a.space == ActionSpace::Tip)));
-            let numbers = action.iter().flat_map(|a| a.numbers.iter().copied());
-            std::iter::once(space).chain(numbers.collect::<Vec<_>>())
-        };
-        self.0.iter().flat_map(one)
+        let Self(waiting) = self;
+        waiting.iter().flat_map(|action| match action {
+            Some(Action { space, numbers }) => {
+                let space = 1.0 + f64::from(u8::from(*space == ActionSpace::Tip));
+                std::iter::once(space).chain(numbers.iter().copied())
+            }
+            None => std::iter::once(0.0).chain([].iter().copied()),
+        })
     }
 }
 

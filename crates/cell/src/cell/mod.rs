@@ -202,8 +202,9 @@ impl Cell {
         self.edges.strains(&self.world, 1.0).iter().fold(1.0, |most, s| s.stretch.max(most))
     }
 
-    /// Whether the axis of an instrument's part lies inside an organ, by arm: privileged. Held tissue,
-    /// tissue that blades shear, and organs in a hole of which the instrument is do not count.
+    /// Whether the axis of an instrument's part lies inside an organ, by arm: privileged. Held
+    /// tissue, tissue that blades shear, and organs in a hole of which the instrument is do not
+    /// count.
     pub fn axes_inside(&self) -> Vec<bool> {
         self.arms.iter().map(|arm| !arm.pierces(&self.world).is_empty()).collect()
     }

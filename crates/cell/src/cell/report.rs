@@ -156,8 +156,8 @@ pub enum CellEvent {
         /// Pull at which it tore (N).
         force_n: f64,
     },
-    /// A cutter has closed through tissue as far as it goes: through all of it, to the scene's gate,
-    /// or until it opens again.
+    /// A cutter has closed through tissue as far as it goes: through all of it, to the scene's
+    /// gate, or until it opens again.
     Cut {
         /// The arm.
         arm: Side,
@@ -173,9 +173,9 @@ pub enum CellEvent {
         #[serde(skip_serializing_if = "Option::is_none")]
         parted: Option<Box<Severance>>,
     },
-    /// The instrument has punctured an organ: it came through the surface and had pressed on it with
-    /// at least the scene's `safety.puncture_force_n`. Around the hole it does not touch the organ
-    /// until it is out.
+    /// The instrument has punctured an organ: it came through the surface and had pressed on it
+    /// with at least the scene's `safety.puncture_force_n`. Around the hole it does not touch the
+    /// organ until it is out.
     Punctured {
         /// The arm.
         arm: Side,
@@ -188,8 +188,8 @@ pub enum CellEvent {
         /// The largest force with which it pressed on the organ in the last 0.1 s (N).
         force_n: f64,
     },
-    /// The axis of the instrument came into an organ that its jaws do not hold, with less force than
-    /// punctures it.
+    /// The axis of the instrument came into an organ that its jaws do not hold, with less force
+    /// than punctures it.
     Pierced {
         /// The arm.
         arm: Side,
@@ -217,7 +217,8 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest.
         volume: f64,
     },
-    /// Tissue and solids pushed the instrument with more than the scene's limit; the instrument retracts.
+    /// Tissue and solids pushed the instrument with more than the scene's limit; the instrument
+    /// retracts.
     ForceLimit {
         /// The arm.
         arm: Side,

@@ -14,9 +14,9 @@ impl Cell {
         space.clamp(&build::start(start, port, space))
     }
 
-    /// Restores the tissue of `state` without grasps and holes, puts the arms at rest at `starts` (one for
-    /// each arm), and sets the time to zero. The same state and starts give the same bits, whatever
-    /// the cell did before.
+    /// Restores the tissue of `state` without grasps and holes, puts the arms at rest at `starts`
+    /// (one for each arm), and sets the time to zero. The same state and starts give the same bits,
+    /// whatever the cell did before.
     ///
     /// # Errors
     /// A state of another cell, or a start out of an arm's reach. The cell then has to be restored

@@ -25,7 +25,8 @@ pub struct Settling {
     /// They settled without damping: that speed is below 0.01 m/s.
     pub settled: bool,
     /// How long kinetic damping took (s).
-    pub calmed_s: f64,
+    #[serde(alias = "calmed_s")]
+    pub damped_s: f64,
     /// Largest node speed in the end (m/s).
     pub resting_speed_m_s: f64,
 }
@@ -41,11 +42,11 @@ impl Cell {
             speed = self.step(None)?.tissue.max_speed;
         }
         let settled = speed < SETTLED_SPEED;
-        let mut settling = Settling { settled_speed_m_s: speed, settled, calmed_s: 0.0, resting_speed_m_s: speed };
+        let mut settling = Settling { settled_speed_m_s: speed, settled, damped_s: 0.0, resting_speed_m_s: speed };
         let (mut slow_s, mut energy) = (0.0, self.world.state.kinetic_energy(&self.world.model));
-        while !settled && slow_s < SLOW_S && settling.calmed_s < MAX_DAMPING_S {
+        while !settled && slow_s < SLOW_S && settling.damped_s < MAX_DAMPING_S {
             settling.resting_speed_m_s = self.step(None)?.tissue.max_speed;
-            settling.calmed_s += self.period();
+            settling.damped_s += self.period();
             let now = self.world.state.kinetic_energy(&self.world.model);
             (slow_s, energy) = if settling.resting_speed_m_s < SETTLED_SPEED {
                 // Slow: not damped any more, to verify that it stays slow.

@@ -39,7 +39,8 @@ impl CellState {
                 hash.update(&number.to_bits().to_le_bytes());
             }
         }
-        // Nothing where nothing waits: hashes of cells without a delay are those of earlier versions.
+        // Nothing where nothing waits: hashes of cells without a delay are those of earlier
+        // versions.
         waiting.numbers().for_each(|number| hash.update(&number.to_bits().to_le_bytes()));
         hash.digest()
     }

@@ -9,8 +9,8 @@ pub struct View {
     /// Scene file or built-in scene such as cell-a; a specimen's folder; an episode's file or
     /// folder; a folder of a campaign or of demonstrations.
     pub source: String,
-    /// Who acts: operator (the arms hold their place until an operator moves them), scripted, noise,
-    /// delay, offset, greedy, random; ws://HOST:PORT or python:... as for episode.
+    /// Who acts: operator (the arms hold their place until an operator moves them), scripted,
+    /// noise, delay, offset, greedy, random; ws://HOST:PORT or python:... as for episode.
     #[arg(long, default_value = "scripted")]
     pub policy: String,
     /// Seed of the first episode.

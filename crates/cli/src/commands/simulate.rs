@@ -77,7 +77,7 @@ pub fn text(r: &LiftResult) -> String {
         peak(|a| a.peak_contact_n),
         peak(|a| a.peak_constraint_n),
         d.settling.settled_speed_m_s,
-        d.settling.calmed_s,
+        d.settling.damped_s,
         d.settling.resting_speed_m_s,
         d.inverted_rest,
         s.inverted_peak,

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use trocar_geometry::TriMesh;
 
 /// Maximum number of triangles, and of vertices, of a cluster.
-pub(super) const MOST: usize = 96;
+pub(super) const MAX_CLUSTER: usize = 96;
 
 /// The clusters of a shape.
 #[derive(Clone, Debug)]
@@ -65,7 +65,7 @@ impl Clusters {
             }
             let number = fixed.clusters.len() as u32;
             let fresh = corners.iter().filter(|v| place[**v as usize].0 != number).count();
-            if open.triangles as usize == MOST || open.vertices as usize + fresh > MOST {
+            if open.triangles as usize == MAX_CLUSTER || open.vertices as usize + fresh > MAX_CLUSTER {
                 open = fixed.close(open);
             }
             let number = fixed.clusters.len() as u32;

@@ -172,8 +172,8 @@ impl Stage {
         Ok(ShapeId(self.shapes.len() - 1))
     }
 
-    /// Moves the vertices of a shape to `positions` (m). The next picture that casts rays refits the
-    /// search tree; it is not rebuilt.
+    /// Moves the vertices of a shape to `positions` (m). The next picture that casts rays refits
+    /// the search tree; it is not rebuilt.
     ///
     /// # Errors
     /// The shape is unknown, or the number of positions differs from its number of vertices.
@@ -265,8 +265,8 @@ impl Stage {
         self.bodies.iter().map(|b| self.shapes[b.shape].triangles.len()).sum()
     }
 
-    /// Frees what is kept of earlier previews, see [`crate::render_into`]. The next ones are made from
-    /// nothing and are the same.
+    /// Frees what is kept of earlier previews, see [`crate::render_into`]. The next ones are made
+    /// from nothing and are the same.
     pub fn forget_pictures(&mut self) {
         self.memory = Memory::default();
     }
@@ -277,9 +277,9 @@ impl Stage {
         self.lamps.extend(self.lights.iter().map(Lamp::new));
     }
 
-    /// Updates the trees over triangles and the tree over bodies. Large bodies enter the tree with many of their
-    /// nodes, so that a ray need not descend into every body whose box it crosses (Benthin and
-    /// others 2017, "Improved Two-Level BVHs using Partial Re-Braiding").
+    /// Updates the trees over triangles and the tree over bodies. Large bodies enter the tree with
+    /// many of their nodes, so that a ray need not descend into every body whose box it crosses
+    /// (Benthin and others 2017, "Improved Two-Level BVHs using Partial Re-Braiding").
     pub(crate) fn update_acceleration(&mut self) {
         if !self.stale {
             return;

@@ -90,8 +90,8 @@ impl Stage {
         Surface { position, flat, smooth, albedo }
     }
 
-    /// The surface points of a body that eight rays of a camera meet at parameters `t`, in the lanes
-    /// `group`: on triangles with these numbers among those of all bodies.
+    /// The surface points of a body that eight rays of a camera meet at parameters `t`, in the
+    /// lanes `group`: on triangles with these numbers among those of all bodies.
     #[allow(clippy::too_many_arguments, reason = "one call")]
     #[inline(always)]
     pub(crate) fn surfaces<S: Simd>(

@@ -245,8 +245,8 @@ impl<'a> Band<'a> {
         }
     }
 
-    /// Tests triangles in lanes `lanes` whose boxes (first and last column, first and last row) have
-    /// at most [`TINY`] pixels: one pixel of each at a time.
+    /// Tests triangles in lanes `lanes` whose boxes (first and last column, first and last row)
+    /// have at most [`TINY`] pixels: one pixel of each at a time.
     #[inline(always)]
     fn tiny<S: Simd>(
         &mut self,

@@ -62,7 +62,7 @@ pub(super) fn check(scene: &Scene) -> Checked {
 }
 
 /// Most constants of a task.
-const MOST_CONSTANTS: usize = 32;
+const MAX_CONSTANTS: usize = 32;
 
 /// Checks what scenes say of stages of their own, but for their expressions.
 fn own_stages(scene: &Scene) -> Checked {
@@ -78,8 +78,8 @@ fn own_stages(scene: &Scene) -> Checked {
             " is 0, as all others; one stage or more must have a share".to_owned(),
         ));
     }
-    if task.constants.len() > MOST_CONSTANTS {
-        let reason = format!(" has {} entries; it must have at most {MOST_CONSTANTS}", task.constants.len());
+    if task.constants.len() > MAX_CONSTANTS {
+        let reason = format!(" has {} entries; it must have at most {MAX_CONSTANTS}", task.constants.len());
         return Err(problem("task.constants", reason));
     }
     for (own, value) in &task.constants {

@@ -10,7 +10,7 @@ use trocar_specimen::nearest;
 type Checked<T> = Result<T, Mistake>;
 
 /// Most measures of a task: every row has room for as many.
-pub const MOST_MEASURES: usize = 16;
+pub const MAX_MEASURES: usize = 16;
 
 const FUNCTIONS: [&str; 14] = [
     "attached", "in_mouth", "force", "jaw", "distance", "moved", "aside", "risen", "visible", "abs", "min", "max",
@@ -67,7 +67,8 @@ fn shown(text: &str) -> String {
     text.chars().take(60).flat_map(char::escape_default).collect()
 }
 
-fn likeness<'n>(given: &str, known: impl IntoIterator<Item = &'n str>) -> String {
+/// What a name that is not known may mean, as the end of a message.
+fn did_you_mean<'n>(given: &str, known: impl IntoIterator<Item = &'n str>) -> String {
     nearest(given, known).map_or_else(String::new, |n| format!("; did you mean '{n}'?"))
 }
 
@@ -314,7 +315,7 @@ impl Checker<'_> {
         let same = self.constants.iter().find(|c| c.split_once('.').is_some_and(|(_, own)| own == name));
         let hint = match same {
             Some(same) => format!("; did you mean '{same}'?"),
-            None => likeness(name, all.chain(FUNCTIONS)),
+            None => did_you_mean(name, all.chain(FUNCTIONS)),
         };
         Err(Mistake::new(at, format!("there is no channel '{}'{hint}", shown(name))))
     }
@@ -401,7 +402,7 @@ impl Checker<'_> {
                 Ok((number, Kind { flag: false, ..kind }))
             }
             _ => {
-                let hint = likeness(name, FUNCTIONS);
+                let hint = did_you_mean(name, FUNCTIONS);
                 let hint = if hint.is_empty() { format!("; there are {}", FUNCTIONS.join(", ")) } else { hint };
                 Err(Mistake::new(at, format!("there is no function '{}'{hint}", shown(name))))
             }
@@ -440,7 +441,7 @@ impl Checker<'_> {
                 return with(kind).ok_or_else(|| Mistake::new(at, format!("the scene has no arm with a {word}")));
             }
             _ => {
-                let hint = likeness(word, ["left", "right", "grasper", "cutter"]);
+                let hint = did_you_mean(word, ["left", "right", "grasper", "cutter"]);
                 let reason = format!("there is no arm '{}'; left, right, grasper or cutter{hint}", shown(word));
                 return Err(Mistake::new(at, reason));
             }
@@ -456,7 +457,7 @@ impl Checker<'_> {
             Node::Name(name) if self.cameras.contains(name) => Ok(name.clone()),
             Node::Name(name) => {
                 let all: Vec<&str> = known().collect();
-                let (hint, all) = (likeness(name, known()), all.join(", "));
+                let (hint, all) = (did_you_mean(name, known()), all.join(", "));
                 Err(Mistake::new(tree.at, format!("there is no camera '{}'; the scene has {all}{hint}", shown(name))))
             }
             _ => Err(Mistake::new(tree.at, "a camera of the scene is needed, such as endoscope")),
@@ -476,7 +477,7 @@ impl Checker<'_> {
         let organ = name.strip_prefix("organ.").unwrap_or(self.organ);
         match self.organs {
             Some(known) if name != "organ" && !known.contains(&organ) => {
-                let hint = likeness(organ, known.iter().copied());
+                let hint = did_you_mean(organ, known.iter().copied());
                 let reason =
                     format!("there is no organ '{}'; the specimen has {}{hint}", shown(organ), known.join(", "));
                 Err(Mistake::new(at, reason))
@@ -522,10 +523,10 @@ impl Checker<'_> {
         let place = self.measures.iter().position(|m| *m == measure);
         let place = match place {
             Some(place) => place,
-            None if self.measures.len() == MOST_MEASURES => {
+            None if self.measures.len() == MAX_MEASURES => {
                 return Err(Mistake::new(
                     at,
-                    format!("is one measure too many; a task has at most {MOST_MEASURES} different ones"),
+                    format!("is one measure too many; a task has at most {MAX_MEASURES} different ones"),
                 ));
             }
             None => {

@@ -12,7 +12,7 @@ mod syntax;
 mod tree;
 mod units;
 
-pub use check::MOST_MEASURES;
+pub use check::MAX_MEASURES;
 pub(crate) use check::{Checker, Hints};
 pub use measure::{Measure, Part, Place, Target};
 pub(crate) use names::Needs;

@@ -7,8 +7,8 @@ use winnow::token::{literal, take_while};
 use winnow::{ModalResult, Parser};
 
 /// Longest expression (bytes) and deepest nesting of brackets.
-const MOST_BYTES: usize = 1000;
-const MOST_DEPTH: usize = 12;
+const MAX_BYTES: usize = 1000;
+const MAX_DEPTH: usize = 12;
 
 /// Words that are no names.
 const KEYWORDS: [&str; 7] = ["and", "or", "not", "then", "while", "for", "in"];
@@ -87,8 +87,8 @@ impl<'a> ParserError<Input<'a>> for Mistake {
 
 /// The tree of `text`.
 pub(crate) fn parse(text: &str) -> Result<Tree, Mistake> {
-    if text.len() > MOST_BYTES {
-        return Err(Mistake::new(0, format!("has {} bytes; at most {MOST_BYTES}: use more stages", text.len())));
+    if text.len() > MAX_BYTES {
+        return Err(Mistake::new(0, format!("has {} bytes; at most {MAX_BYTES}: use more stages", text.len())));
     }
     let mut depth = 0_usize;
     for (at, c) in text.char_indices() {
@@ -97,8 +97,8 @@ pub(crate) fn parse(text: &str) -> Result<Tree, Mistake> {
             ')' | ']' => depth = depth.saturating_sub(1),
             _ => {}
         }
-        if depth > MOST_DEPTH {
-            return Err(Mistake::new(at, format!("brackets are nested deeper than {MOST_DEPTH}; use more stages")));
+        if depth > MAX_DEPTH {
+            return Err(Mistake::new(at, format!("brackets are nested deeper than {MAX_DEPTH}; use more stages")));
         }
     }
     let mut input = LocatingSlice::new(text);

@@ -22,7 +22,7 @@ pub use steps::Baseline;
 use crate::{Episode, Error, Result};
 use trocar_cell::Action;
 
-/// Actions a chunk (SPEC E4).
+/// Actions in a chunk.
 pub const CHUNK: usize = 8;
 
 /// Says what the arms do, a chunk of actions after the other.

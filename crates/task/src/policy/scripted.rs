@@ -15,7 +15,7 @@ use super::grip::Grip;
 use super::phase::Phase;
 use super::script::{AfterHold, CutAt, Script};
 use super::{CHUNK, Policy};
-use crate::judge::{Memory, Sight};
+use crate::judge::{Context, Memory};
 use crate::{Channels, Episode, Error, Result};
 use glam::DVec3;
 use trocar_cell::{Action, Setpoint};
@@ -55,7 +55,7 @@ const ENOUGH_ABOVE: f64 = 0.0005;
 /// as tissue follows this share of a step.
 const RISE: f64 = 0.001;
 const RISE_S: f64 = 0.2;
-const MOST_ABOVE: f64 = 0.008;
+const MAX_ABOVE: f64 = 0.008;
 const RISES: f64 = 0.25;
 
 /// Every further grasp is this much farther from where the organ is held, in organ coordinates.
@@ -408,7 +408,7 @@ impl Scripted {
     fn goes_on(&self, episode: &Episode, least: f64) -> bool {
         let (t, gate) = (seen(episode).task, episode.scene().task.gates.lift_mm);
         let wanted = t.lift_mm < gate + 1e3 * ENOUGH_ABOVE;
-        t.grasped > 0.0 && wanted && t.lift_mm >= least && self.lift < 1e-3 * gate + MOST_ABOVE
+        t.grasped > 0.0 && wanted && t.lift_mm >= least && self.lift < 1e-3 * gate + MAX_ABOVE
     }
 
     /// Whether the grasper has pierced an organ.
@@ -446,11 +446,11 @@ fn seen(episode: &Episode) -> Channels {
 /// Whether held tissue is up as the task's stages of a lift want it, for however long.
 fn is_lifted(episode: &Episode) -> bool {
     let (program, row) = (episode.program(), seen(episode));
-    let sight = Sight { row: &row, rows: &[], constants: &program.constants };
+    let context = Context { row: &row, rows: &[], constants: &program.constants };
     let mut stages = program.stages.iter().filter(|stage| LIFTED.contains(&stage.name.as_str()));
     stages.all(|stage| {
         let now: &Condition = if let Condition::Lasts { what, .. } = &stage.when { what } else { &stage.when };
-        sight.holds(now, &mut Memory::new(stage.timers, stage.marks))
+        context.holds(now, &mut Memory::new(stage.timers, stage.marks))
     })
 }
 

@@ -1,15 +1,15 @@
 //! The baseline of a task of one's own: the steps of its `[[task.script]]`, one after the other.
 //!
 //! Like the scripted controller it looks at where the tissue is, which no policy that is scored
-//! may, closes the jaws as far as the tissue gives ([`Grip`]), and all it does goes through actions.
-//! An arm that loses what its last step `grasp` took, goes back to that step.
+//! may, closes the jaws as far as the tissue gives ([`Grip`]), and all it does goes through
+//! actions. An arm that loses what its last step `grasp` took, goes back to that step.
 
 use super::aim::{self, Manner, Place, eased};
 use super::grip::Grip;
 use super::scripted::{Scripted, Style};
 use super::{CHUNK, Policy};
 use crate::bodies::bodies_of;
-use crate::judge::{Memory, Sight};
+use crate::judge::{Context, Memory};
 use crate::{Episode, Error, Result};
 use glam::DVec3;
 use trocar_cell::{Action, Setpoint};
@@ -52,8 +52,8 @@ struct Steps {
     to: Vec<Setpoint>,
     last: Vec<Setpoint>,
     until: Memory,
-    /// How each arm closes and comes, whether on a fold, and how often it has tried in its last step
-    /// `grasp`.
+    /// How each arm closes and comes, whether on a fold, and how often it has tried in its last
+    /// step `grasp`.
     grips: Vec<Grip>,
     manners: Vec<Manner>,
     folds: Vec<bool>,
@@ -189,8 +189,8 @@ impl Steps {
         }
     }
 
-    /// Skips grasps of tissue that is held already. They occur after an arm that lost its tissue has
-    /// gone back to its own grasp.
+    /// Skips grasps of tissue that is held already. They occur after an arm that lost its tissue
+    /// has gone back to its own grasp.
     fn skip_held(&mut self, episode: &Episode) -> Result<()> {
         while let Some(step) = self.script(episode) {
             let k = Self::arm(episode, step)?;
@@ -224,8 +224,8 @@ impl Steps {
         if let (Some(until), Some(row)) = (&step.until, episode.rows().last())
             && matches!(self.phase, Some(Phase::Move | Phase::Wait))
         {
-            let sight = Sight { row, rows: &[], constants: &episode.program().constants };
-            if sight.holds(until, &mut self.until) {
+            let context = Context { row, rows: &[], constants: &episode.program().constants };
+            if context.holds(until, &mut self.until) {
                 return Ok(true);
             }
         }

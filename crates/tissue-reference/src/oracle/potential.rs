@@ -1,5 +1,5 @@
-//! The minimised function: energy, gradient and Hessian over all nodes of a body, or of several that
-//! may touch.
+//! The minimised function: energy, gradient and Hessian over all nodes of a body, or of several
+//! that may touch.
 
 use super::contact::Contacts;
 use super::element::{deformation, projected};

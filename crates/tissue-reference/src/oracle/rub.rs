@@ -33,8 +33,8 @@ impl Rub {
     }
 }
 
-/// How far the place where friction holds a point follows it (m), if the spring stretches by no more
-/// than `most`.
+/// How far the place where friction holds a point follows it (m), if the spring stretches by no
+/// more than `most`.
 pub(super) fn dragged(normal: DVec3, off: DVec3, most: f64) -> DVec3 {
     let slide = off - off.dot(normal) * normal;
     let length = slide.length();

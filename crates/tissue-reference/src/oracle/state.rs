@@ -77,18 +77,18 @@ impl OracleState {
         Self { time: 0.0, bodies: model.bodies().iter().map(at_rest).collect(), stretches: Stretches::new() }
     }
 
-    /// The motion of a stepper's state, without its grasps; [`Held`] replaces them. Friction at tools
-    /// and between bodies holds everything where it is.
+    /// The motion of a stepper's state, without its grasps; [`Held`] replaces them. Friction at
+    /// tools and between bodies holds everything where it is.
     pub fn from_state(model: &Model, state: &State) -> Self {
         let nodes = |(index, body): (usize, &Body)| Nodes::new(body, &state.motion(model, index));
         let bodies = model.bodies().iter().enumerate().map(nodes).collect();
         Self { time: state.time, bodies, stretches: Stretches::new() }
     }
 
-    /// A stepper's state of the same motion, rounded to `f32`, without grasps and without the stretch
-    /// of friction's springs at tools and between bodies. The accelerations
-    /// for the adaptive start are the change of velocity since `before`, the oracle's state a step
-    /// of `dt` (s) earlier.
+    /// A stepper's state of the same motion, rounded to `f32`, without grasps and without the
+    /// stretch of friction's springs at tools and between bodies. The accelerations for the
+    /// adaptive start are the change of velocity since `before`, the oracle's state a step of `dt`
+    /// (s) earlier.
     ///
     /// # Errors
     /// States of another model or that are not finite; a `dt` that is not above 0.

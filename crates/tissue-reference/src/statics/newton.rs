@@ -124,8 +124,8 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Moves held nodes to a share of their way, and the free ones with them as the tangent says: if
-    /// they stayed, elements between them would be turned inside out.
+    /// Moves held nodes to a share of their way, and the free ones with them as the tangent says:
+    /// if they stayed, elements between them would be turned inside out.
     fn move_held(&mut self, moved: &[(u32, DVec3)], share: f64, u: &mut [DVec3]) -> std::result::Result<(), Failure> {
         let mut way = vec![DVec3::ZERO; u.len()];
         for (i, by) in moved {

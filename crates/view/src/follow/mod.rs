@@ -30,8 +30,8 @@ const ACTOR: &str = "environment";
 /// Time between the states that are kept for the next client while nobody watches.
 const UNWATCHED_EVERY: Duration = Duration::from_millis(100);
 
-/// A running viewer of an episode of another program. It stops when it is dropped; in a child made by
-/// `fork` that is left to the parent.
+/// A running viewer of an episode of another program. It stops when it is dropped; in a child made
+/// by `fork` that is left to the parent.
 pub struct Follower {
     inner: Option<Box<Inner>>,
     process: u32,

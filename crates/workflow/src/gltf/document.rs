@@ -14,7 +14,8 @@ const FLOAT: u32 = 5126;
 const VERTICES: u32 = 34962;
 const INDICES: u32 = 34963;
 
-/// The root turns the cell's axes (z up) into those of glTF (y up): quaternion with the scalar last.
+/// The root turns the cell's axes (z up) into those of glTF (y up): quaternion with the scalar
+/// last.
 const Y_UP: [f64; 4] = [-std::f64::consts::FRAC_1_SQRT_2, 0.0, 0.0, std::f64::consts::FRAC_1_SQRT_2];
 
 /// A metallic and rough material; the colour is linear.

@@ -4,8 +4,8 @@
 //!
 //! - 1, meshes: the cube (lowest corner and step, four f64); for each organ the numbers of vertices
 //!   and triangles (u32), the vertices' colours (3 bytes each) and the triangles (three u32 each).
-//!   They hold until the next such record, which comes at the start, after a cut, and when something
-//!   leaves the cube.
+//!   They hold until the next such record, which comes at the start, after a cut, and when
+//!   something leaves the cube.
 //! - 2, a frame: time (s) and score as f64; the state as f32; for each arm its links' poses, its
 //!   gripper's pose and the angle of its jaws as f32 (a pose is seven numbers, scalar of the
 //!   quaternion first); for each organ three 16-bit numbers a vertex as differences from the frame
@@ -29,12 +29,12 @@ use xxhash_rust::xxh3::xxh3_64;
 
 const FORMAT: &str = "trocar-surfaces";
 const VERSION: u32 = 1;
-/// Largest file (bytes), longest header line, most vertices or triangles of an organ, and most organs,
-/// arms, links and numbers of a state.
-const MOST_BYTES: u64 = 1 << 32;
-const MOST_HEADER: usize = 1 << 20;
-const MOST_VERTICES: u32 = 1 << 22;
-const MOST_NAMES: usize = 1000;
+/// Largest file (bytes), longest header line, most vertices or triangles of an organ, and most
+/// organs, arms, links and numbers of a state.
+const MAX_BYTES: u64 = 1 << 32;
+const MAX_HEADER: usize = 1 << 20;
+const MAX_VERTICES: u32 = 1 << 22;
+const MAX_NAMES: usize = 1000;
 /// Kinds of records.
 const MESHES: u8 = 1;
 const FRAME: u8 = 2;
@@ -229,8 +229,8 @@ impl Encoder {
 pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>> {
     let io = |source| Error::Io { path: path.to_owned(), source };
     let length = std::fs::metadata(path).map_err(io)?.len();
-    if length > MOST_BYTES {
-        let reason = format!("has {length} bytes; at most {MOST_BYTES} are read");
+    if length > MAX_BYTES {
+        let reason = format!("has {length} bytes; at most {MAX_BYTES} are read");
         return Err(Error::Mismatch(format!("{}: {reason}", path.display())));
     }
     std::fs::read(path).map_err(io)
@@ -251,7 +251,7 @@ type Said<T> = std::result::Result<T, String>;
 impl Decoder {
     /// Checks the bytes of a file; says what is wrong with them.
     pub fn new(bytes: Vec<u8>) -> Said<Self> {
-        let end = bytes.iter().take(MOST_HEADER).position(|b| *b == b'\n');
+        let end = bytes.iter().take(MAX_HEADER).position(|b| *b == b'\n');
         let end = end.ok_or("is no file of surfaces: it has no header line")?;
         let line: Line = serde_json::from_slice(&bytes[..end]).map_err(|e| format!("its header is damaged: {e}"))?;
         if line.format != FORMAT || line.version != VERSION {
@@ -265,7 +265,7 @@ impl Decoder {
         let header = line.header;
         let links = header.arms.iter().map(|a| a.links).max().unwrap_or(0);
         let counts = [header.organs.len(), header.arms.len(), links, header.state_names.len()];
-        if counts.iter().any(|n| *n > MOST_NAMES) || header.period_s.is_nan() || header.period_s <= 0.0 {
+        if counts.iter().any(|n| *n > MAX_NAMES) || header.period_s.is_nan() || header.period_s <= 0.0 {
             return Err("its header is damaged: it has too many names, or no control period".to_owned());
         }
         let mut body = std::io::Cursor::new(bytes);
@@ -341,7 +341,7 @@ impl Decoder {
     fn count(&mut self) -> Said<u32> {
         let bytes = self.bytes(4)?;
         let count = u32::from_le_bytes(std::array::from_fn(|i| bytes[i]));
-        if count > MOST_VERTICES {
+        if count > MAX_VERTICES {
             return Err(format!("frame {} is damaged: a mesh has {count} vertices or triangles", self.read));
         }
         Ok(count)

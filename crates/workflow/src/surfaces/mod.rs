@@ -1,7 +1,7 @@
 //! What an episode looked like, kept beside its actions: the organs' surfaces, the poses of arms,
-//! instruments and cameras, and what a policy observed, at the start and after every control period.
-//! Pictures are made of it without simulation, so that they do not depend on physics that may have
-//! changed since.
+//! instruments and cameras, and what a policy observed, at the start and after every control
+//! period. Pictures are made of it without simulation, so that they do not depend on physics that
+//! may have changed since.
 
 mod format;
 mod playback;

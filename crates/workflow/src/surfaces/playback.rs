@@ -32,8 +32,9 @@ pub struct RecordedEpisode {
 }
 
 impl RecordedEpisode {
-    /// Opens the episode in `folder`. One without surfaces is replayed, and every step compared with
-    /// the recorded one. Its specimen is that of its scene, or the one in the folder `specimen`.
+    /// Opens the episode in `folder`. One without surfaces is replayed, and every step compared
+    /// with the recorded one. Its specimen is that of its scene, or the one in the folder
+    /// `specimen`.
     ///
     /// # Errors
     /// Names the file: one that is missing or damaged, surfaces of another episode, an episode

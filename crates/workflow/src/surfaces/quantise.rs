@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 /// Largest number.
-const MOST: f64 = u16::MAX as f64;
+const MAX_NUMBER: f64 = u16::MAX as f64;
 /// The cube exceeds the points that it is made for by this (m): lifted tissue stays inside.
 const MARGIN: f64 = 0.15;
 
@@ -24,13 +24,13 @@ impl Grid {
         });
         let (low, high) = bounds?;
         let edge = (high - low).max_element() + 2.0 * MARGIN;
-        Some(Self { low: 0.5 * (low + high) - DVec3::splat(0.5 * edge), step: edge / MOST })
+        Some(Self { low: 0.5 * (low + high) - DVec3::splat(0.5 * edge), step: edge / MAX_NUMBER })
     }
 
     /// The numbers of a point; `None` outside of the cube.
     pub fn numbers(&self, p: DVec3) -> Option<[u16; 3]> {
         let scaled = ((p - self.low) / self.step).round();
-        let inside = scaled.cmpge(DVec3::ZERO).all() && scaled.cmple(DVec3::splat(MOST)).all();
+        let inside = scaled.cmpge(DVec3::ZERO).all() && scaled.cmple(DVec3::splat(MAX_NUMBER)).all();
         inside.then(|| scaled.to_array().map(|v| v as u16))
     }
 

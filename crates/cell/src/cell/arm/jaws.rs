@@ -55,8 +55,8 @@ impl ArmUnit {
         }
     }
 
-    /// Counts the frames for which jaws that closed on tissue have stood at their commanded opening,
-    /// or just short of it because they press with their whole force.
+    /// Counts the frames for which jaws that closed on tissue have stood at their commanded
+    /// opening, or just short of it because they press with their whole force.
     fn count_standing(&mut self, wanted: f64, opening: f64, force: f64) {
         let state = &mut self.state;
         let at_it = (wanted - opening).abs() < SAME_OPENING;

@@ -58,8 +58,8 @@ impl ArmUnit {
         [(self.model.tools.gripper, gripper.pose), one, two]
     }
 
-    /// The organs that a part of the instrument is inside of, except what the jaws hold and the blades
-    /// shear, and those in a hole of which it is; each with a place there (m).
+    /// The organs that a part of the instrument is inside of, except what the jaws hold and the
+    /// blades shear, and those in a hole of which it is; each with a place there (m).
     pub fn pierces(&self, world: &World) -> Vec<(usize, DVec3)> {
         let felt = if self.state.shears.is_some() { 1 } else { 3 };
         let mut organs = self.inside_organs(world, felt);
@@ -67,8 +67,8 @@ impl ArmUnit {
         organs
     }
 
-    /// The organs that one of the first `count` tools is inside of: the shaft, then the blades; each
-    /// with a place there (m).
+    /// The organs that one of the first `count` tools is inside of: the shaft, then the blades;
+    /// each with a place there (m).
     pub fn inside_organs(&self, world: &World, count: usize) -> Vec<(usize, DVec3)> {
         let Self { model, state, .. } = self;
         let mut found: Vec<(usize, DVec3)> = Vec::new();

@@ -1,5 +1,5 @@
-//! Stage 2: the arms get their commands when the control delay is over, and move for a tissue frame,
-//! in physics steps, under the load of the tissue and among solids.
+//! Stage 2: the arms get their commands when the control delay is over, and move for a tissue
+//! frame, in physics steps, under the load of the tissue and among solids.
 
 use crate::cell::Cell;
 use crate::cell::arm::ArmUnit;

@@ -59,7 +59,8 @@ impl ArmUnit {
         }
     }
 
-    /// Force with which tissue pushes the blades apart (N): what presses on them, and what they cut.
+    /// Force with which tissue pushes the blades apart (N): what presses on them, and what they
+    /// cut.
     pub fn opening_force(&self) -> f64 {
         let state = &self.state;
         let cut = state.bite.as_ref().map_or(0.0, |bite| bite.force);

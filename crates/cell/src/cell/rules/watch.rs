@@ -19,8 +19,9 @@ pub(in crate::cell) struct OrganWatch {
 impl OrganWatch {
     /// Its bytes, for the hash.
     pub fn bytes(&self) -> [u8; 5] {
-        let [a, b, c, d] = self.frames_alone.to_le_bytes();
-        [a, b, c, d, u8::from(self.overstretched)]
+        let Self { overstretched, frames_alone } = *self;
+        let [a, b, c, d] = frames_alone.to_le_bytes();
+        [a, b, c, d, u8::from(overstretched)]
     }
 }
 

@@ -1,9 +1,9 @@
-//! Jaws that turn until the bed or pinned tissue pushes their blades back: with their opening force,
-//! or, when they close, with the scene's force limit, as ideal arms move. Another instrument yields
-//! instead: it is pushed away.
+//! Jaws that turn until the bed or pinned tissue pushes their blades back: with their opening
+//! force, or, when they close, with the scene's force limit, as ideal arms move. Another instrument
+//! yields instead: it is pushed away.
 //!
-//! Blades turn once a frame of tissue, by up to 1.4 mm at their tips, nearly their radius. Springs in
-//! the arms' steps would come too late for that.
+//! Blades turn once a frame of tissue, by up to 1.4 mm at their tips, nearly their radius. Springs
+//! in the arms' steps would come too late for that.
 
 use super::Solids;
 use super::meeting::Meeting;
@@ -22,8 +22,8 @@ const MAX_TURN: f64 = 0.035;
 
 impl Solids {
     /// The angle to which the jaws of `arm` turn in this frame on their way to `wanted` (rad):
-    /// less far if solids would push back with more than that force, and with more than where the jaws
-    /// are.
+    /// less far if solids would push back with more than that force, and with more than where the
+    /// jaws are.
     pub fn turn_jaws(&self, arm: &ArmUnit, wanted: f64) -> f64 {
         let angle = arm.state.gripper.jaw_angle;
         if wanted == angle {
@@ -55,8 +55,9 @@ impl Solids {
         reached
     }
 
-    /// Whether the axis of a blade of `arm` goes through pinned tissue with the jaws at `angle` (rad).
-    /// What has crossed a surface is not pushed back by it. Blades that shear go through tissue.
+    /// Whether the axis of a blade of `arm` goes through pinned tissue with the jaws at `angle`
+    /// (rad). What has crossed a surface is not pushed back by it. Blades that shear go through
+    /// tissue.
     fn blades_cross(&self, arm: &ArmUnit, angle: f64) -> bool {
         if arm.state.shears.is_some() {
             return false;

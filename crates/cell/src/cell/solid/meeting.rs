@@ -16,7 +16,8 @@ pub(in crate::cell) struct Meeting {
     pub normal: DVec3,
     /// Distance of the surfaces (m), negative where they press.
     pub gap: f64,
-    /// Depth at which the axis of the instrument's part would reach the solid's, or its surface (m).
+    /// Depth at which the axis of the instrument's part would reach the solid's, or its surface
+    /// (m).
     pub room: f64,
     /// The organ whose pinned tissue it is.
     pub organ: Option<usize>,

@@ -1,7 +1,7 @@
 //! Solids: instruments push each other, the bed and tissue that cannot move.
 //!
-//! An instrument is its shaft and two blades, all of capsules ([`rod`]). Where they touch a solid, a
-//! one-sided spring without friction pushes ([`spring`]), in every physics step of the arms. What
+//! An instrument is its shaft and two blades, all of capsules ([`rod`]). Where they touch a solid,
+//! a one-sided spring without friction pushes ([`spring`]), in every physics step of the arms. What
 //! may touch is found anew at the beginning of each step ([`meeting`]); there is no memory of
 //! earlier contacts. An arm with dynamics has the spring in its implicit step, so that no stiffness
 //! is too high; an ideal arm stops where the solids push it with the scene's force limit

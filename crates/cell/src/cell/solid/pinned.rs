@@ -17,8 +17,8 @@ use trocar_tissue::Hole;
 /// Least cosine of the angle between a triangle's normal and the direction in which it pushes.
 const LEAST_COSINE: f64 = 0.5;
 
-/// Share of a rod's radius by which it may come into tissue. An axis that came near the surface would
-/// get past the edge between two triangles, because a part is pushed by one triangle only.
+/// Share of a rod's radius by which it may come into tissue. An axis that came near the surface
+/// would get past the edge between two triangles, because a part is pushed by one triangle only.
 const ROOM: f64 = 0.5;
 
 /// Most triangles of a leaf.
@@ -98,8 +98,8 @@ impl PinnedSurface {
         }
     }
 
-    /// Whether the axis of one of `rods`, which belong to `tool`, goes through a triangle that is in
-    /// none of its `holes`.
+    /// Whether the axis of one of `rods`, which belong to `tool`, goes through a triangle that is
+    /// in none of its `holes`.
     pub(super) fn is_crossed(&self, rods: &[Rod], holes: &[Hole], tool: usize) -> bool {
         let mut crossed = false;
         for rod in rods {

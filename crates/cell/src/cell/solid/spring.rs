@@ -2,9 +2,9 @@
 //!
 //! Instruments are far stiffer at their surface than along their shaft and in the arm's gears: a
 //! steel tube of 5 mm and 0.5 mm wall that sticks out by 0.1 m yields at its end by 1 mm under 10 N
-//! (3 E I / L^3), and gears of 10 kN m/rad by about as much at the instrument. The spring stands for
-//! these. Let R be the depth at which the two axes would meet. At depths d beyond 3/4 R the spring
-//! hardens to k / (4 (1 - d/R))^2, so that no axis passes another.
+//! (3 E I / L^3), and gears of 10 kN m/rad by about as much at the instrument. The spring stands
+//! for these. Let R be the depth at which the two axes would meet. At depths d beyond 3/4 R the
+//! spring hardens to k / (4 (1 - d/R))^2, so that no axis passes another.
 
 /// Stiffness of solids that begin to touch (N/m).
 const STIFFNESS: f64 = 1e4;

@@ -110,8 +110,8 @@ impl Piece<'_> {
 }
 
 impl Measured {
-    /// Of a place with these `shares` at `off` from what it touches; `otherwise` is the direction of
-    /// no distance.
+    /// Of a place with these `shares` at `off` from what it touches; `otherwise` is the direction
+    /// of no distance.
     fn between(off: DVec3, shares: [f64; 4], otherwise: DVec3) -> Self {
         let distance = off.length();
         let normal = if distance > NO_DIRECTION { off / distance } else { otherwise };

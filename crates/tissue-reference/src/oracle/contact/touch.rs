@@ -56,8 +56,9 @@ pub struct Gap {
 }
 
 impl Touch<'_> {
-    /// The gap with all nodes at `x`. The smallest of several distances is rounded off over a length
-    /// of `blur` (m): where two are equal a vertex lies in a valley, and a minimum may be there.
+    /// The gap with all nodes at `x`. The smallest of several distances is rounded off over a
+    /// length of `blur` (m): where two are equal a vertex lies in a valley, and a minimum may be
+    /// there.
     pub fn gap(&self, x: &[DVec3], blur: f64) -> Gap {
         let measured: Vec<Measured> = self.pieces.iter().map(|piece| piece.at(x)).collect();
         let least = measured.iter().map(|m| m.distance).fold(f64::INFINITY, f64::min);
@@ -89,8 +90,8 @@ impl Touch<'_> {
         gap
     }
 
-    /// How far a contact of some `depth` (m, negative where it presses) is pressed, and beyond where
-    /// it hardens (m).
+    /// How far a contact of some `depth` (m, negative where it presses) is pressed, and beyond
+    /// where it hardens (m).
     fn pressed(&self, depth: f64) -> [f64; 2] {
         [(-depth).max(0.0), (-depth - self.hard_from).max(0.0)]
     }
