@@ -127,7 +127,7 @@ impl Cells {
         let split = prepare::split(split)?;
         py.detach(|| {
             let specimens = prepare::specimens(&scene, split, &phantoms)?;
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(wrong)?;
+            let pool = trocar_core::thread_pool(threads).map_err(wrong)?;
             // One cell uses all threads; of many, each has its own.
             let each = if count == 1 { threads } else { 1 };
             let seed = split.seed(0);

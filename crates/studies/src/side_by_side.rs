@@ -13,8 +13,7 @@ pub(crate) fn side_by_side(
     progress: &dyn Progress,
     run: &(dyn Fn(usize, &dyn Progress) -> Result<()> + Sync),
 ) -> Result<()> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|e| Error::Mismatch(format!("{threads} threads cannot be started: {e}")))?;
+    let pool = trocar_core::thread_pool(threads).map_err(Error::Mismatch)?;
     progress.begin(stage, (finished + count) as u64);
     progress.advance(finished as u64);
     let quiet = Quiet(progress);

@@ -95,9 +95,7 @@ impl Stepper {
         if single_thread {
             self.pool = None;
         } else if self.pool.is_none() {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build();
-            self.pool =
-                Some(pool.map_err(|e| Error::Model(format!("{} threads cannot be started: {e}", self.threads)))?);
+            self.pool = Some(trocar_core::thread_pool(self.threads).map_err(Error::Model)?);
         }
         self.solvers.set_model(model, single_thread);
         Ok(())

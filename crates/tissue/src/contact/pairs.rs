@@ -67,6 +67,8 @@ struct Role {
 pub(crate) struct Pairs {
     /// How far tools carry held nodes of each body in the frame (m).
     carried: Vec<f32>,
+    /// The gap of contact (m).
+    offset: f32,
     /// Pairs that may touch in the frame.
     candidates: Vec<Pair>,
     /// Pairs that may touch in the substep.
@@ -122,6 +124,7 @@ impl Pairs {
         }
         let own = coupling.island(island.index(0));
         let contact = coupling.contact();
+        self.offset = contact.offset as f32;
         let member = |body: u32| (0..island.count()).find(|m| island.index(*m) == body as usize);
         let near = coupling.near().iter().filter(|near| coupling.island(near.body as usize) == own);
         for near in near {
@@ -181,8 +184,20 @@ impl Pairs {
     /// They are those where the vertex will be along the surface at the end: planes of where it is
     /// now would be steps in its way wherever it passes an edge. Pairs of bodies that were at rest
     /// (`rested`) since the last substep of this frame do not change.
-    pub fn find(&mut self, island: &(impl Members + ?Sized), h: f32, rested: impl Fn(usize) -> bool) {
+    ///
+    /// What rests falls by h^2 g in a substep. Where that is more than half of the gap of contact,
+    /// as in long frames, pairs are listed from farther away: what fell through the gap unseen
+    /// would be thrown back.
+    pub fn find(
+        &mut self,
+        island: &(impl Members + ?Sized),
+        frame: &Frame<'_>,
+        h: f32,
+        rested: impl Fn(usize) -> bool,
+    ) {
         self.list.clear();
+        let fall = h * h * frame.gravity.length() as f32;
+        let margin = SUBSTEP_MARGIN.max(fall - 0.5 * self.offset);
         for pair in &mut self.candidates {
             if rested(pair.member) && rested(pair.other) {
                 if pair.listed {
@@ -201,7 +216,7 @@ impl Pairs {
             };
             let way = h * (one.v[pair.vertex as usize] - theirs(triangle, foot.weights));
             let carried = self.carried[pair.member] + self.carried[pair.other];
-            let reach = (pair.free + SUBSTEP_MARGIN + 2.0 * way.length() + carried).max(0.0);
+            let reach = (pair.free + margin + 2.0 * way.length() + carried).max(0.0);
             if pair.stretch == Vec3A::ZERO && foot.off.length_squared() > reach * reach && pair.outside {
                 continue;
             }

@@ -52,7 +52,7 @@ impl Solver for TouchingDescent {
 
     fn substep(island: &mut IslandFrame<'_, Self>, from: f64, to: f64) {
         let IslandFrame { slots, pairs, frame, h, .. } = island;
-        pairs.find(&**slots, *h, |_| false);
+        pairs.find(&**slots, frame, *h, |_| false);
         for BodySlot { index, body, solver, state, .. } in slots.iter_mut() {
             let way = |i: usize| *h * state.v[i];
             solver.contacts.find(&frame.of(*index), body, [from, to], |i| state.x[i], way);

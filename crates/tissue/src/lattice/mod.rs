@@ -119,7 +119,7 @@ impl Solver for LatticeSolver {
 
     fn substep(island: &mut IslandFrame<'_, Self>, from: f64, to: f64) {
         let IslandFrame { slots, pairs, frame, h, .. } = island;
-        pairs.find(&**slots, *h, |_| false);
+        pairs.find(&**slots, frame, *h, |_| false);
         for member in 0..slots.len() {
             slots[member].solver.pressed = pairs.presses(&**slots, member);
         }

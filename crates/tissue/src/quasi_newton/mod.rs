@@ -117,7 +117,7 @@ impl IslandSystem<'_> {
     fn find_contacts(&mut self, from: f64, to: f64) {
         let Self { slots, pairs, frame, h, .. } = self;
         let (frame, h) = (*frame, *h);
-        pairs.find(&**slots, h, |member| from > 0.0 && !slots[member].solver.sleep.active);
+        pairs.find(&**slots, frame, h, |member| from > 0.0 && !slots[member].solver.sleep.active);
         for_each(slots, frame, |BodySlot { index, body, solver, .. }| {
             solver.find_contacts(&frame.of(*index), body, [from, to], h);
         });
