@@ -5,7 +5,9 @@
 ///
 /// ```
 /// use trocar_core::median;
-/// assert_eq!([median([3.0, 1.0, 2.0]), median([4.0, 1.0]), median([])], [Some(2.0), Some(2.5), None]);
+/// assert_eq!(median([3.0, 1.0, 2.0]), Some(2.0));
+/// assert_eq!(median([4.0, 1.0]), Some(2.5));
+/// assert_eq!(median([]), None);
 /// ```
 pub fn median(mut values: impl AsMut<[f64]>) -> Option<f64> {
     let values = values.as_mut();
