@@ -4,6 +4,7 @@
 #![allow(clippy::print_stderr, reason = "this is a command-line program")]
 
 mod figures;
+mod package;
 mod peers;
 mod python;
 mod tools;
@@ -49,7 +50,7 @@ fn main() -> ExitCode {
         }
         ["python"] => code(check_python(python::Build::Module)),
         ["viewer"] => code(check_viewer(viewer::Tests::Browser)),
-        ["package"] => code(told(&viewer::package())),
+        ["package"] => code(told(&package::package())),
         ["docs"] => code(docs()),
         ["tools"] => {
             tools::fetch();

@@ -1,13 +1,10 @@
 //! The checks of the page of `trocar view`: types, build and tests, with Node. They are skipped,
 //! with the reason, where Node or the network is missing.
 
-use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// The page's folder.
-const FOLDER: &str = "viewer";
-/// Where the crate that serves the page has it in a package.
-const PAGE: &str = "crates/view/page";
+pub const FOLDER: &str = "viewer";
 /// The oldest Node that the build supports, as `viewer/package.json` says.
 const OLDEST: (u32, u32) = (20, 19);
 
@@ -44,40 +41,13 @@ pub fn check(tests: Tests) -> Result<(), &'static str> {
     Ok(())
 }
 
-/// Packages all crates into `target/package`, with the page in the one that serves it. The page is
-/// put into its folder for that time only: a program of a clone serves `viewer/dist`, which
-/// changes.
-pub fn package() -> Result<(), String> {
+/// Builds the page of this moment into `viewer/dist`.
+pub fn build() -> Result<(), String> {
     node().map_err(|why| format!("packages carry the page, which Node builds: {why}"))?;
-    let changed = Command::new("git").args(["status", "--porcelain"]).output().map_err(|e| format!("git: {e}"))?;
-    if !changed.status.success() || !changed.stdout.is_empty() {
-        return Err("packages are made of what is committed; commit first".to_owned());
-    }
     if !npm(&["ci", "--no-audit", "--no-fund", "--loglevel=error"]) || !npm(&["run", "--silent", "build"]) {
         return Err("the page cannot be built".to_owned());
     }
-    let page = Path::new(PAGE);
-    let told = |what: &str, path: &Path, e: std::io::Error| format!("{} cannot be {what}: {e}", path.display());
-    let remove = || if page.exists() { std::fs::remove_dir_all(page) } else { Ok(()) };
-    remove().map_err(|e| told("removed", page, e))?;
-    copy(&Path::new(FOLDER).join("dist"), page).map_err(|e| told("written", page, e))?;
-    // Only the page is not committed.
-    let packaged = crate::cargo(&["package", "--workspace", "--no-verify", "--locked", "--allow-dirty"], &[]);
-    remove().map_err(|e| told("removed", page, e))?;
-    if packaged { Ok(()) } else { Err("cargo package fails".to_owned()) }
-}
-
-/// Copies a file, or a folder with what is in it.
-fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
-    if from.is_dir() {
-        std::fs::create_dir_all(to)?;
-        for entry in std::fs::read_dir(from)? {
-            let entry = entry?;
-            copy(&entry.path(), &to.join(entry.file_name()))?;
-        }
-        return Ok(());
-    }
-    std::fs::copy(from, to).map(|_| ())
+    Ok(())
 }
 
 fn npm(arguments: &[&str]) -> bool {

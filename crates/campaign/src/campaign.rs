@@ -6,6 +6,7 @@ use crate::manifest::{self, Manifest};
 use crate::page;
 use crate::policy_server::{POLL_INTERVAL, PolicyServer, start_servers};
 use crate::policy_spec::PolicySpec;
+use crate::remote::check_servers;
 use crate::store::{self, Store};
 use crate::table::CampaignResult;
 use crate::videos;
@@ -28,6 +29,32 @@ const MIN_JOB_LIMIT: usize = 32;
 pub const DEFAULT_VARIATION: VariationSet = VariationSet::Standard;
 
 /// A campaign on this machine.
+///
+/// ```
+/// use trocar_campaign::{Campaign, PolicySpec};
+/// # use trocar_core::Silent;
+/// # let dir = tempfile::tempdir()?;
+/// # let file = trocar_testing::tube::reach(dir.path(), "reach.toml", 0.2, &["endoscope"]);
+/// # let (file, output, phantoms) = (file.display().to_string(), dir.path().join("campaign"), dir.path().join("phantoms"));
+///
+/// let campaign = Campaign {
+///     scene: file,
+///     policies: vec![PolicySpec::parse("scripted")?, PolicySpec::parse("random")?],
+///     episodes: 2,
+///     split: Default::default(),
+///     seed: 0,
+///     variation: None,
+///     by: Vec::new(),
+///     jobs: 1,
+///     retry_failed: false,
+///     surfaces: false,
+///     phantoms,
+/// };
+/// let result = campaign.run(&output, &Silent)?;
+/// assert_eq!(result.policies.iter().map(|p| p.episodes).sum::<usize>(), 4);
+/// assert!(output.join("report.html").is_file());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Campaign {
     /// Scene file or name of a built-in scene.
@@ -97,6 +124,7 @@ impl Campaign {
         // Policies are loaded before anything is built or written.
         let missing = |p: &&PolicySpec| self.retry_failed || !store::has_episodes(output, &p.name, self.episodes);
         let policies: Vec<&PolicySpec> = self.policies.iter().filter(missing).collect();
+        check_servers(&policies, progress)?;
         let servers = start_servers(&policies, progress)?;
         let specimens = SpecimenCache::new(&scene, &self.phantoms);
         let named = manifest::named_specimen(&scene, self.split);

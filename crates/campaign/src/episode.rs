@@ -3,7 +3,7 @@
 use crate::manifest;
 use crate::policy_server::{POLL_INTERVAL, start_servers};
 use crate::policy_spec::PolicySpec;
-use crate::remote::RemotePolicy;
+use crate::remote::{RemotePolicy, check_servers};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -23,7 +23,8 @@ pub fn make_policy(spec: &PolicySpec, episode: &Episode, stop: &Arc<AtomicBool>)
 }
 
 /// Runs the episode `run` into the folder `output`. Its policy is anything that
-/// [`PolicySpec::parse`] accepts. A Python policy is loaded before anything is built.
+/// [`PolicySpec::parse`] accepts. A Python policy is loaded, and a server asked, before
+/// anything is built.
 ///
 /// # Errors
 /// As [`EpisodeRun::run`]; a policy that is unknown or cannot be loaded. `output` then stays
@@ -35,6 +36,7 @@ pub fn run_episode(run: &EpisodeRun, output: &Path, progress: &dyn Progress) -> 
         return EpisodeRun { policy: spec.source, ..run.clone() }.run(output, progress);
     }
     run.check(output)?;
+    check_servers(&[&spec], progress)?;
     let mut servers = start_servers(&[&spec], progress)?;
     let (stop, done) = (Arc::new(AtomicBool::new(false)), AtomicBool::new(false));
     let made = std::thread::scope(|scope| {

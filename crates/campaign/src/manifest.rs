@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use trocar_scene::{Scene, SpecimenSource, Split, Variation};
 use trocar_specimen::Specimen;
 use trocar_task::{scene_hash, specimen_hash};
-use trocar_workflow::{Error, Result};
+use trocar_workflow::{Error, Result, counted};
 
 /// Maximum number of episodes per policy.
 const MAX_EPISODES: usize = 100_000;
@@ -49,7 +49,8 @@ pub(super) fn check(policies: &[PolicySpec], episodes: usize, seed: u64, max_epi
     let most = Split::FIRST_UNSEEN - episodes as u64;
     if seed > most {
         return wrong(format!(
-            "--seed {seed}: it must be at most {most} for {episodes} episodes; --split unseen has the seeds from {}",
+            "--seed {seed}: it must be at most {most} for {}; --split unseen has the seeds from {}",
+            counted(episodes, "episode"),
             Split::FIRST_UNSEEN
         ));
     }

@@ -42,7 +42,7 @@ impl PolicySpec {
             if let Err(why) = Endpoint::new(source).check() {
                 return wrong(address, &why.to_string());
             }
-            (address, format!("{}{place}", scheme(source)))
+            (address, format!("{}-{place}", scheme(source).trim_end_matches("://")))
         } else {
             (text, source.to_owned())
         };
@@ -64,6 +64,11 @@ impl PolicySpec {
             return wrong(shown, "its name must have 1 to 80 characters and must not begin with a dot");
         }
         Ok(Self { name, source: source.to_owned() })
+    }
+
+    /// Whether the policy is that of a running server.
+    pub(super) fn is_server(&self) -> bool {
+        is_address(&self.source)
     }
 
     /// Whether the policy runs in another process: a server or a Python callable.
@@ -125,7 +130,7 @@ mod tests {
         assert_eq!(name("scripted").unwrap(), pair("scripted", "scripted"));
         assert_eq!(name("mine=ws://127.0.0.1:8000").unwrap(), pair("mine", "ws://127.0.0.1:8000"));
         // A path or a query may hold a token: neither is in a name.
-        assert_eq!(name("ws://h:1/a?b=c").unwrap(), pair("ws---h-1", "ws://h:1/a?b=c"));
+        assert_eq!(name("ws://h:1/a?b=c").unwrap(), pair("ws-h-1", "ws://h:1/a?b=c"));
         assert_eq!(name("python:policies.lift:make").unwrap().1, "python:policies.lift:make");
         for bad in ["", "genius", "=scripted", "..=scripted", "python:lift"] {
             assert!(name(bad).is_err(), "{bad}");

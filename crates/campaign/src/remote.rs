@@ -15,6 +15,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use trocar_cell::{Action, ActionSpace};
+use trocar_core::Progress;
 use trocar_remote::{Array, Client, Endpoint, Observation, Value};
 use trocar_render::RenderSettings;
 use trocar_sensors::CameraRig;
@@ -29,6 +30,9 @@ const RECORDING: &str = "recording";
 const KEY: &str = "TROCAR_POLICY_KEY";
 /// Environment variable with the timeout of a reply (s).
 const TIMEOUT: &str = "TROCAR_POLICY_TIMEOUT_S";
+
+/// Interval at which an attempt to connect is checked.
+const CONNECT_POLL: Duration = Duration::from_millis(5);
 
 /// A policy in another process.
 pub(super) struct RemotePolicy {
@@ -196,6 +200,33 @@ impl RemotePolicy {
             .map(|numbers| self.bounds.action(numbers).map_err(|e| e.to_string()))
             .collect()
     }
+}
+
+/// Connects once to every server among `policies`, so that one that does not answer is reported
+/// before anything is built.
+pub(super) fn check_servers(policies: &[&PolicySpec], progress: &dyn Progress) -> Result<()> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let mut endpoints = Vec::new();
+    for spec in policies.iter().filter(|p| p.is_server()) {
+        let mut endpoint = endpoint(spec)?;
+        endpoint.interrupt = Some(Arc::clone(&stop));
+        endpoints.push(endpoint);
+    }
+    std::thread::scope(|scope| {
+        let connect = || endpoints.iter().try_for_each(|endpoint| Client::connect(endpoint).map(|_| ()));
+        let connecting = scope.spawn(connect);
+        while !connecting.is_finished() {
+            if progress.interrupted() {
+                stop.store(true, Ordering::Relaxed);
+            }
+            std::thread::sleep(CONNECT_POLL);
+        }
+        match connecting.join() {
+            _ if stop.load(Ordering::Relaxed) => Err(Error::Interrupted),
+            Ok(connected) => connected.map_err(|why| Error::Mismatch(why.to_string())),
+            Err(_) => Err(Error::Mismatch("the policy servers cannot be checked: a thread failed".to_owned())),
+        }
+    })
 }
 
 /// The endpoint of the policy `spec`, with key and timeout of the environment. A Python callable

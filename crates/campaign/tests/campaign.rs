@@ -199,11 +199,12 @@ fn an_address_has_no_secret_in_any_file_and_a_failure_is_told() {
     let dir = TempDir::new().unwrap();
     scene(dir.path());
     let folder = dir.path().join("campaign");
-    // Nobody listens there.
-    let address = "ws://127.0.0.1:1/policy?token=secret";
-    let result = campaign(dir.path(), &[address], 1).run(&folder, &Silent).unwrap();
-    assert_eq!(result.policies[0].policy, "ws---127.0.0.1-1");
-    assert!(result.policies[0].policy_error.as_ref().unwrap().contains("cannot connect"), "{result:?}");
+    let server = Loopback::start(&LoopbackOptions::default(), |_| Err("out of memory".to_owned())).unwrap();
+    let address = format!("{}/policy?token=secret", server.url());
+    let result = campaign(dir.path(), &[&address], 1).run(&folder, &Silent).unwrap();
+    let name = server.url().replace("://", "-").replace(':', "-");
+    assert_eq!(result.policies[0].policy, name);
+    assert!(result.policies[0].policy_error.as_ref().unwrap().contains("out of memory"), "{result:?}");
     let mut open = vec![folder.clone()];
     while let Some(path) = open.pop() {
         if path.is_dir() {
@@ -215,8 +216,9 @@ fn an_address_has_no_secret_in_any_file_and_a_failure_is_told() {
     }
     assert!(std::fs::read_to_string(folder.join("report.html")).unwrap().contains("--retry-failed"));
     // The same address goes on; one with another query is another policy.
-    campaign(dir.path(), &[address], 1).run(&folder, &Silent).unwrap();
-    let other = campaign(dir.path(), &["ws://127.0.0.1:1/policy?token=other"], 1).run(&folder, &Silent);
+    campaign(dir.path(), &[&address], 1).run(&folder, &Silent).unwrap();
+    let other = format!("{}/policy?token=other", server.url());
+    let other = campaign(dir.path(), &[&other], 1).run(&folder, &Silent);
     assert!(other.unwrap_err().to_string().contains("another policy"));
 }
 

@@ -36,9 +36,9 @@ pub enum Error {
         known: String,
     },
     /// A field of the scene cannot be built.
-    #[error("scene '{scene}': {field} {reason}")]
+    #[error("{scene}: {field} {reason}")]
     Scene {
-        /// The scene's name.
+        /// The scene's file or name, see [`trocar_scene::Scene::label`].
         scene: String,
         /// The field.
         field: String,

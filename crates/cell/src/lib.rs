@@ -25,7 +25,8 @@ mod world;
 pub use cell::{
     Action, ActionSpace, ArmObservation, Carried, Cell, CellEvent, CellReport, CellState, ContactParts, FreeSpace,
     HapticModel, MAX_LOAD, Moment, Placed, PortSpace, REACH_TOLERANCE, ROLL_SPEED, Reached, RuleCounts, SWING_SPEED,
-    Setpoint, Settling, TIP_SPEED, TaggedForce, Timing, TissueObservation, ToolReach, Workspace, tool_reach,
+    Setpoint, Settling, TIP_SPEED, TaggedForce, Timing, TissueObservation, ToolReach, Workspace, check_starts,
+    tool_reach,
 };
 pub use clusters::{Cluster, clusters};
 pub use cutter::{CUT_CLOSED, CUT_OPENED, Scissors};

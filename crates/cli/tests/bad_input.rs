@@ -150,6 +150,31 @@ fn the_input_is_never_replaced() {
     assert!(fixture.file("color/000002.png").is_file());
 }
 
+#[test]
+fn figures_are_printed_only_for_what_was_measured() {
+    let fixture = Fixture::new();
+    let (recording, output) = (fixture.file(""), fixture.dir.path().join("specimen"));
+    let made = trocar(&["reconstruct", recording.to_str().unwrap(), "--window", "0", "-o", output.to_str().unwrap()]);
+    let said = String::from_utf8_lossy(&made.stdout).into_owned();
+    assert!(said.contains("The window holds only 1 frame."), "{said}");
+    assert!(said.contains("against the truth") && !said.contains("- mm"), "{said}");
+}
+
+/// A replay of an episode with another specimen, which differs, gives the reason once.
+#[test]
+fn a_difference_is_reported_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = trocar_testing::tube::reach(dir.path(), "reach.toml", 0.2, &["endoscope"]);
+    let at = |name: &str| dir.path().join(name).display().to_string();
+    let episode = trocar(&["episode", scene.to_str().unwrap(), "--policy", "random", "-o", &at("episode")]);
+    assert!(episode.status.success(), "{}", String::from_utf8_lossy(&episode.stderr));
+    trocar_testing::tube::two_tubes(trocar_testing::tube::ONE_END, 3e-3).write(&dir.path().join("other")).unwrap();
+    let replayed = trocar(&["--quiet", "replay", &at("episode"), "--verify", "--specimen", &at("other")]);
+    let said = String::from_utf8_lossy(&replayed.stderr).into_owned();
+    assert_eq!(replayed.status.code(), Some(2), "{said}");
+    assert!(replayed.stdout.is_empty() && said.lines().count() == 1, "{said}");
+}
+
 /// A greyscale PNG of one value, 16-bit or 8-bit.
 fn gray_png(width: usize, height: usize, deep: bool) -> Vec<u8> {
     let dir = tempfile::tempdir().unwrap();

@@ -208,23 +208,35 @@ fn a_policy_that_fails_ends_its_episode_and_the_campaign_goes_on() {
         assert!(said.contains(why) && !said.contains('\n'), "seed {seed}: {said}");
         assert!(episode["duration_s"].as_f64().unwrap() > 0.0);
     }
-    // After the server's end, finished episodes stay, and repeated ones fail with a reason.
+    // After the server's end, finished episodes stay, and it is not asked for them.
     let url = server.url();
     drop(server);
     let before = table(&folder);
     let again = json(&evaluate(&scene, &folder, &["--policy", &policy, "--episodes", "9"]).output().unwrap());
     assert_eq!((&again["hash"], before), (&result["hash"], table(&folder)));
     let gone = dir.path().join("gone");
-    let result = json(&evaluate(&scene, &gone, &["--policy", &url, "--episodes", "1"]).output().unwrap());
-    assert_eq!(result["policies"][0]["ends"]["policy-error"], 1);
-    let report = std::fs::read_to_string(gone.join("report.html")).unwrap();
-    assert!(report.contains("connect"), "the page tells why");
-    // The text says so, too, with the remedy.
+    // A server that is not there is reported before anything is built.
+    let output = evaluate(&scene, &gone, &["--policy", &url, "--episodes", "1"]).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("cannot connect") && said.lines().count() == 1 && !gone.exists(), "{said}");
+    // A failure on the way is in the page and in the text, with the remedy.
+    let server = Loopback::start(&LoopbackOptions::default(), |_| Err("out of memory".to_owned())).unwrap();
+    let url = server.url();
     let mut command = Command::new(env!("CARGO_BIN_EXE_trocar"));
     command.args(["-q", "evaluate"]).arg(&scene).arg("-o").arg(&gone).args(["--policy", &url, "--episodes", "1"]);
     let output = command.output().unwrap();
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success() && said.contains("cannot connect") && said.contains("--retry-failed"), "{said}");
+    assert!(output.status.success() && said.contains("out of memory") && said.contains("--retry-failed"), "{said}");
+    assert!(std::fs::read_to_string(gone.join("report.html")).unwrap().contains("out of memory"));
+    // An episode without a step has no figures, and gives its reason once.
+    let mut command = Command::new(env!("CARGO_BIN_EXE_trocar"));
+    command.args(["-q", "episode"]).arg(&scene).arg("-o").arg(dir.path().join("none")).args(["--policy", &url]);
+    let said = String::from_utf8(command.output().unwrap().stdout).unwrap();
+    assert!(said.contains("left: nothing was measured") && !said.contains(" N"), "{said}");
+    assert_eq!(said.matches("the policy failed").count(), 1, "{said}");
+    let page = std::fs::read_to_string(dir.path().join("none/report.html")).unwrap();
+    assert!(page.contains("out of memory") && !page.contains("Peak force"));
 }
 
 #[cfg(unix)]

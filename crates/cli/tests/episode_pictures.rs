@@ -74,7 +74,7 @@ fn an_episode_is_filmed_and_what_is_wrong_is_told() {
     refused(&run, "no.png", &["--at", "7"], &["--at is 7 s", "the episode ends after 0.50 s"]);
     refused(&run, "no.webp", &["--at", "0.1"], &["--at", ".png"]);
     refused("cell-a", "no.png", &["--specimen", "tube"], &["--specimen is only for episodes"]);
-    refused(&at("none.trocar"), "no.png", &[], &["none.trocar", "No such file"]);
+    refused(&at("none.trocar"), "no.png", &[], &["none.trocar", "no such file"]);
     // The specimen is in another folder, then another specimen.
     std::fs::rename(dir.path().join("tube"), dir.path().join("moved")).unwrap();
     refused(&run, "no.png", &[], &["tube"]);

@@ -53,6 +53,38 @@ fn mistakes_are_one_line() {
     assert!(String::from_utf8_lossy(&unknown.stderr).contains("did you mean 'cell-a'?"));
 }
 
+/// `scene check` of a resection of a tube whose specimen is in this place (m).
+fn checked(position: [f64; 3], insertion: Option<f64>) -> String {
+    let dir = tempfile::tempdir().unwrap();
+    let file = trocar_testing::tube::reach(dir.path(), "mine.toml", 1.0, &["endoscope"]);
+    let mut scene = trocar_scene::Scene::read_file(&file).unwrap();
+    scene.task.name = trocar_scene::TaskName::AppendixResection;
+    scene.placement.position_m = position;
+    if let Some(insertion) = insertion {
+        scene.arms[0].start.insertion_mm = insertion;
+    }
+    std::fs::write(&file, scene.to_toml().unwrap()).unwrap();
+    let output = trocar(&["scene", "check", file.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stdout));
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(said.starts_with(&format!("error: {}: ", file.display())), "{said}");
+    said
+}
+
+#[test]
+fn an_organ_that_is_out_of_reach_or_in_the_way_is_named() {
+    // A metre aside, and 13 cm too high.
+    let aside = checked([1.0, 0.46, 0.045], None);
+    assert!(aside.contains("the left arm misses the tube by") && aside.contains("trocar scene new"), "{aside}");
+    let high = checked([0.0, 0.46, 0.175], None);
+    assert!(high.contains("the left arm misses the tube by"), "{high}");
+    // Within reach, but the arm would start in the bed.
+    let deep = checked([0.0, 0.46, 0.045], Some(160.0));
+    let words = ["arm 'left', start.insertion_mm is 160 mm", " mm beyond ", "low at z = 2", "it must be in [", "] mm"];
+    assert!(words.iter().all(|word| deep.contains(word)), "{deep}");
+}
+
 #[test]
 #[cfg(target_os = "linux")]
 fn a_result_that_cannot_be_printed_is_no_success() {

@@ -64,6 +64,11 @@ fn inputs() -> TempDir {
     std::fs::write(at("mine/thesis.tex"), "precious").unwrap();
     std::fs::write(at("damaged.stl"), "solid nothing\nfacet").unwrap();
     std::fs::write(at("damaged.trocar"), "no episode").unwrap();
+    std::fs::write(at("result.json"), "{\n  \"scene\": \"mine\"\n}\n").unwrap();
+    let reach = std::fs::read_to_string(at("reach.toml")).unwrap();
+    let deep = reach.replacen("insertion_mm = 100.0", "insertion_mm = 160.0", 1);
+    assert_ne!(deep, reach);
+    std::fs::write(at("start.toml"), deep).unwrap();
     here
 }
 
@@ -84,6 +89,16 @@ fn errors_of_wrong_inputs() {
         ("reconstruct-without-units", &["reconstruct", "--surface", "damaged.stl", "-o", "out"]),
         ("reconstruct-wrong-unit", &["reconstruct", "--surface", "damaged.stl", "--units", "inch", "-o", "out"]),
         ("scene-missing", &["scene", "check", "nowhere.toml"]),
+        ("scene-folder", &["scene", "check", "tube"]),
+        ("scene-start", &["scene", "check", "start.toml"]),
+        ("task-folder", &["task", "show", "mine"]),
+        ("episode-folder", &["episode", "tube", "-o", "out"]),
+        ("episode-start", &["episode", "start.toml", "-o", "out"]),
+        ("episode-server", &["episode", "reach.toml", "--policy", "ws://127.0.0.1:1", "-o", "out"]),
+        ("evaluate-folder", &["evaluate", "mine", "-o", "out"]),
+        ("evaluate-server", &["evaluate", "reach.toml", "--policy", "mine=ws://127.0.0.1:1", "-o", "out"]),
+        ("view-missing", &["view", "nowhere.toml", "--no-open"]),
+        ("view-foreign", &["view", "mine", "--no-open"]),
         ("scene-builtin", &["scene", "show", "cell-d"]),
         ("scene-unit", &["scene", "check", "unit.toml"]),
         ("scene-key", &["scene", "check", "key.toml"]),
@@ -110,6 +125,9 @@ fn errors_of_wrong_inputs() {
         ("episode-no-python", &["episode", "reach.toml", "--policy", "python:mine.py:act", "-o", "out"]),
         ("episode-output", &["episode", "reach.toml", "-o", "mine"]),
         ("replay-missing", &["replay", "nowhere"]),
+        ("replay-foreign", &["replay", "result.json"]),
+        ("replay-specimen", &["replay", "damaged.trocar", "--specimen", "tube"]),
+        ("sweep-foreign", &["sweep", "result.json", "--gate", "lift_mm=1..3"]),
         ("replay-damaged", &["replay", "damaged.trocar"]),
         ("sweep-gate", &["sweep", "nowhere", "--gate", "height_mm=1..3"]),
         ("sweep-values", &["sweep", "nowhere", "--gate", "lift_mm=NaN"]),

@@ -80,7 +80,8 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
     let organs = &recording.info.organs;
     let masks = organs.iter().map(|o| segmenters.mask(o, &background.color)).collect::<Result<Vec<_>>>()?;
     if background.frames_used < settings.min_samples {
-        notes.push(format!("The window holds only {} frames.", background.frames_used));
+        let frames = if background.frames_used == 1 { "frame" } else { "frames" };
+        notes.push(format!("The window holds only {} {frames}.", background.frames_used));
     }
 
     let view = View {

@@ -49,7 +49,7 @@ pub use program::{
     AbortProgram, HintPart, Program, ScriptAction, ScriptProgram, StageProgram, TaskContext, TaskMistake,
 };
 pub use random::EpisodeRandom;
-pub use scene::{Rates, Scene, Tool};
+pub use scene::{Origin, Rates, Scene, Tool};
 pub use stages::{Abort, BUILTIN_TASKS, BuiltinTask, Definition, ScriptStep, Stage, StageOrder};
 pub use start::Start;
 pub use task::{Gates, GraspDesignName, Safety, SafetyRules, Task};

@@ -1,13 +1,18 @@
 //! Reading scenes: files and built-in ones, checked whole.
 
 use crate::check::{Problem, check};
+use crate::scene::Origin;
 use crate::{Builtin, Error, Phantom, Result, Scene, Source, SpecimenSource};
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::Path;
 use trocar_specimen::{Specimen, line_of, nearest, parse_toml};
 
 /// Largest scene file (bytes); the paper's has about 8,000.
 const MAX_BYTES: u64 = 1 << 20;
+
+/// What is right in the place of a path that is no scene file.
+const EXPECTED: &str = "a scene is a TOML file, which `trocar scene new SPECIMEN` writes, or the name of a built-in \
+                        scene, which `trocar scene list` lists";
 
 impl Scene {
     /// The scene of that path or built-in name, checked whole: what it names by path is there, and
@@ -33,15 +38,25 @@ impl Scene {
     /// As [`read`](Self::read).
     pub fn read_file(path: &Path) -> Result<Self> {
         let io = |source| Error::Io { path: path.to_owned(), source };
-        let mut text = String::new();
-        let file = std::fs::File::open(path).map_err(io)?;
-        file.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(io)?;
         let name = path.display().to_string();
+        if path.is_dir() {
+            return Err(Error::Invalid { file: name, reason: format!("is {}; {EXPECTED}", folder_kind(path)) });
+        }
+        let mut text = String::new();
+        let file = match std::fs::File::open(path) {
+            Err(e) if e.kind() == ErrorKind::NotFound => {
+                return Err(Error::Invalid { file: name, reason: format!("no such file; {EXPECTED}") });
+            }
+            opened => opened.map_err(io)?,
+        };
+        file.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(io)?;
         if text.len() as u64 > MAX_BYTES {
             let reason = format!("the file has more than {MAX_BYTES} bytes; a scene file has a few thousand");
             return Err(Error::Invalid { file: name, reason });
         }
-        Self::parse(&text, &name, path.parent().unwrap_or(Path::new("")))
+        let mut scene = Self::parse(&text, &name, path.parent().unwrap_or(Path::new("")))?;
+        scene.origin = Origin(Some(name));
+        Ok(scene)
     }
 
     /// The built-in scene of that name.
@@ -122,6 +137,17 @@ impl Scene {
             None => Ok(Vec::new()),
         }
     }
+}
+
+/// What the folder `path` is, by the file that each kind of folder has.
+fn folder_kind(path: &Path) -> &'static str {
+    const KINDS: [(&str, &str); 4] = [
+        ("specimen.toml", "a specimen folder"),
+        ("recording.toml", "a recording folder"),
+        ("campaign.json", "a campaign folder"),
+        ("episode.trocar", "an episode folder"),
+    ];
+    KINDS.iter().find(|(file, _)| path.join(file).is_file()).map_or("a folder", |(_, kind)| kind)
 }
 
 /// What to write instead of a key of earlier scenes.

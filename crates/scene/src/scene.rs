@@ -13,6 +13,19 @@ use xxhash_rust::xxh3::Xxh3;
 /// A Trocar scene: the whole two-arm cell. The cell frame is right-handed with z up; its origin is
 /// midway between the arms' bases on their mounting plane, x runs from the left base to the right,
 /// y towards the phantom.
+///
+/// ```
+/// use trocar_scene::Scene;
+///
+/// let mut scene = Scene::builtin("cell-a")?;
+/// assert_eq!(scene.tools().len(), 2);
+/// scene.task.episode_s = 10.0;
+/// scene.validate()?;
+/// // The file that `trocar episode` takes.
+/// let text = scene.to_toml()?;
+/// assert_eq!(Scene::parse(&text, "mine.toml", "".as_ref())?, scene);
+/// # Ok::<(), trocar_scene::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
@@ -65,6 +78,19 @@ pub struct Scene {
     /// The folder that paths in the scene start from; not in the file.
     #[serde(skip)]
     pub folder: PathBuf,
+    /// The file that it was read from, for messages.
+    #[serde(skip)]
+    pub origin: Origin,
+}
+
+/// The file that a scene was read from. It is no part of the scene, so all are equal.
+#[derive(Clone, Debug, Default)]
+pub struct Origin(pub Option<String>);
+
+impl PartialEq for Origin {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 /// An arm of a scene with its instrument and its port.
@@ -152,7 +178,13 @@ impl Scene {
             safety: Safety::default(),
             variation: Variation::default(),
             folder: PathBuf::new(),
+            origin: Origin::default(),
         }
+    }
+
+    /// The scene in messages: its file, or its name if it was not read from a file.
+    pub fn label(&self) -> String {
+        self.origin.0.clone().unwrap_or_else(|| format!("scene '{}'", self.name))
     }
 
     /// A path of the scene as the system understands it: relative ones start from the scene file's

@@ -13,6 +13,22 @@ use rayon::prelude::*;
 const SHARED: u64 = 1 << 20;
 
 /// The factor L of a matrix A = P' L L' P, and its memory. P is a nested dissection.
+///
+/// ```
+/// use glam::{DMat3, DVec3};
+/// use trocar_sparse::{BlockMatrix, Cholesky, Level};
+///
+/// // Two nodes, joined and held by springs of 1 N/m.
+/// let mut matrix = BlockMatrix::new(2, [(0, 1)].into_iter());
+/// matrix.add(0, 0, DMat3::IDENTITY * 2.0);
+/// matrix.add(1, 1, DMat3::IDENTITY * 2.0);
+/// matrix.add(1, 0, -DMat3::IDENTITY);
+/// let mut factor = Cholesky::<f64>::new(&matrix, &[DVec3::ZERO, DVec3::X]);
+/// assert!(factor.factorise(Level::new(), matrix.blocks().map(|(_, _, block)| block.to_cols_array_2d())));
+/// let mut x = [3.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+/// factor.solve(&mut x);
+/// assert!((x[0] - 2.0).abs() < 1e-12 && (x[3] - 1.0).abs() < 1e-12);
+/// ```
 pub struct Cholesky<T> {
     order: Vec<u32>,
     supernodes: Vec<Supernode>,

@@ -65,6 +65,20 @@ struct Built {
 }
 
 /// An episode of a scene's task.
+///
+/// ```
+/// use trocar_task::{Episode, policy, run};
+/// # let (mut scene, specimen) = (trocar_testing::tube::resection(), trocar_testing::tube::meshed(trocar_testing::tube::ONE_END, 4e-3));
+/// # scene.task.episode_s = 0.5;
+///
+/// let mut episode = Episode::new(&scene, &specimen, 1)?;
+/// let mut scripted = policy::named("scripted")?;
+/// let recording = run(&mut episode, scripted.as_mut(), 0, &mut |_| true)?;
+/// println!("{} of {} stages", episode.progress().stage, episode.progress().stages.len());
+/// assert_eq!(episode.end().map(|end| end.name()), Some("time-out"));
+/// assert_eq!(recording.channels.len(), 15, "a row for every control period");
+/// # Ok::<(), trocar_task::Error>(())
+/// ```
 pub struct Episode {
     scene: Scene,
     program: Arc<Program>,

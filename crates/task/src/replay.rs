@@ -20,6 +20,12 @@ const FORMAT: &str = "trocar-episode";
 /// 4 switch contact off.
 const VERSION: u32 = 5;
 
+/// The first bytes of every episode file.
+const START: &[u8] = b"{\"format\":\"trocar-episode\"";
+
+/// What a file is that does not begin so.
+const NO_EPISODE: &str = "is no episode file; name the folder of an episode, or its episode.trocar";
+
 /// Largest file (bytes): a million steps.
 const MAX_BYTES: u64 = 100 << 20;
 /// Longest header line (bytes).
@@ -197,8 +203,10 @@ impl EpisodeFile {
     /// A sentence without the file's name.
     pub fn parse(bytes: &[u8]) -> std::result::Result<Self, String> {
         let end = bytes.iter().take(MAX_HEADER).position(|b| *b == b'\n');
-        let end = end.ok_or("is no episode file: it has no header line")?;
-        let line: Line = serde_json::from_slice(&bytes[..end]).map_err(|e| format!("its header is damaged: {e}"))?;
+        let end = end.ok_or(NO_EPISODE)?;
+        let line: Line = serde_json::from_slice(&bytes[..end]).map_err(|e| {
+            if bytes.starts_with(START) { format!("its header is damaged: {e}") } else { NO_EPISODE.to_owned() }
+        })?;
         if line.format != FORMAT || line.version != VERSION {
             let (format, version) = (&line.format, line.version);
             return Err(format!("is {format:.60} version {version}; {FORMAT} version {VERSION} is read"));

@@ -11,6 +11,7 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 use serde::{Deserialize, Serialize};
+use std::io::Read;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
@@ -19,6 +20,8 @@ use xxhash_rust::xxh3::Xxh3;
 
 /// The key of [`ChannelsInfo`] in the file's metadata.
 const KEY: &str = "trocar";
+/// The first bytes of every Parquet file.
+const PARQUET: &[u8; 4] = b"PAR1";
 const FORMAT: &str = "trocar-channels";
 const VERSION: u32 = 4;
 
@@ -203,6 +206,10 @@ pub fn read_channels(path: &Path) -> Result<(ChannelsInfo, Vec<Channels>)> {
     let length = file.metadata().map_err(io)?.len();
     if length > MAX_BYTES {
         return Err(invalid(format!("has {length} bytes; at most {MAX_BYTES} are read")));
+    }
+    let mut start = [0; PARQUET.len()];
+    if (&file).read_exact(&mut start).is_err() || start != *PARQUET {
+        return Err(invalid("is no Parquet file; name the folder of an episode, or its channels.parquet".to_owned()));
     }
     // The decoder is not ours: what it trips over is a bad file, too.
     catch_unwind(AssertUnwindSafe(|| decode(file)))

@@ -61,6 +61,22 @@ const MAX_CONTACT_STIFFNESS: f64 = 1e5;
 const DASHPOTS: f64 = 15.0;
 
 /// Collects bodies and boundary conditions.
+///
+/// ```
+/// use glam::DVec3;
+/// use trocar_geometry::TetMesh;
+/// use trocar_tissue::{BodyDescription, ConstitutiveModel, Material, ModelBuilder};
+///
+/// let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+/// let mesh = &TetMesh { vertices: corners.map(|p| 0.01 * p).to_vec(), tets: vec![[0, 1, 2, 3]] };
+/// let model = ConstitutiveModel::StableNeoHookean;
+/// let material = Material { model, young_modulus: 5e3, poisson_ratio: 0.45, density: 1050.0, viscosity: 5.0 };
+/// let mut builder = ModelBuilder::new().gravity(DVec3::Z * -9.81);
+/// builder.body(BodyDescription { name: "organ".to_owned(), mesh, material, pinned: vec![0], supports: vec![] })?;
+/// let model = builder.build()?;
+/// assert_eq!(model.bodies()[0].len(), 4, "four nodes");
+/// # Ok::<(), trocar_tissue::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct ModelBuilder {
     bodies: Vec<Body>,

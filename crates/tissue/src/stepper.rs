@@ -17,6 +17,29 @@ use glam::DVec3;
 ///
 /// It owns all scratch memory: stepping allocates nothing but lists of contacts that become longer
 /// than before.
+///
+/// ```
+/// use trocar_tissue::{ModelBuilder, SolverSettings, State, Stepper};
+/// # use glam::DVec3;
+/// # use trocar_tissue::{BodyDescription, ConstitutiveModel::StableNeoHookean, Material};
+/// # let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+/// # let mesh = &trocar_geometry::TetMesh { vertices: corners.map(|p| 0.01 * p).to_vec(), tets: vec![[0, 1, 2, 3]] };
+/// # let material = Material { model: StableNeoHookean, young_modulus: 5e3, poisson_ratio: 0.45, density: 1050.0, viscosity: 5.0 };
+/// # let mut builder = ModelBuilder::new().gravity(DVec3::Z * 9.81);
+/// # builder.body(BodyDescription { name: "organ".to_owned(), mesh, material, pinned: vec![0, 1, 2], supports: vec![] })?;
+///
+/// let model = builder.build()?;
+/// let mut state = State::new(&model);
+/// let mut stepper = Stepper::new(&model, SolverSettings::default(), 1.0 / 60.0, 1)?;
+/// let start = state.clone();
+/// let report = stepper.step(&model, &mut state, &[]);
+/// assert!(report.divergence.is_none() && state.hash() != start.hash());
+/// // The same state gives the same step, bit by bit.
+/// let mut again = start;
+/// stepper.step(&model, &mut again, &[]);
+/// assert_eq!(again.hash(), state.hash());
+/// # Ok::<(), trocar_tissue::Error>(())
+/// ```
 pub struct Stepper {
     dt: f64,
     /// Whether a single body is worth several threads.

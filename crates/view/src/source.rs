@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::show::Show;
+use crate::table::Folder;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trocar_core::Progress;
@@ -41,6 +42,37 @@ impl Source {
             Self::Demonstrations(path.to_owned())
         } else {
             Self::Scene(text.to_owned())
+        }
+    }
+
+    /// Checks without building anything that it can be shown.
+    ///
+    /// # Errors
+    /// A path where nothing is, a folder of something else, a file that cannot be read.
+    pub fn check(&self) -> Result<()> {
+        match self {
+            Self::Scene(name) if Path::new(name).is_dir() => Err(Error::Source(format!(
+                "{name}: the folder has no specimen, episode, campaign or demonstrations; name one of those, a scene \
+                 file or a built-in scene"
+            ))),
+            Self::Scene(name) => Ok(Scene::read(name).map(|_| ())?),
+            Self::Specimen(folder) => {
+                Ok(Specimen::organ_names(folder).map(|_| ()).map_err(trocar_workflow::Error::from)?)
+            }
+            Self::Episode(path) => Ok(read_episode(path).map(|_| ())?),
+            Self::Campaign(_) | Self::Demonstrations(_) => match self.folder().and_then(|folder| folder.first()) {
+                Some(_) => Ok(()),
+                None => Err(Error::Source(format!("{}: has no episode", self.name()))),
+            },
+        }
+    }
+
+    /// Its episodes, if it is a folder of some.
+    pub(crate) fn folder(&self) -> Option<Folder> {
+        match self {
+            Self::Campaign(path) => Some(Folder::Campaign(path.clone())),
+            Self::Demonstrations(path) => Some(Folder::Demonstrations(path.clone())),
+            _ => None,
         }
     }
 

@@ -144,6 +144,10 @@ pub fn read_varied(path: &str, variation: Option<VariationSet>, default: Variati
 
 /// The file `name` in the folder `path`, or `path` itself if it is no folder.
 fn inside(path: &Path, name: &str) -> Result<PathBuf> {
+    if !path.exists() {
+        let right = format!("name the folder of an episode, or its {name}");
+        return Err(Error::Mismatch(format!("{}: no such file or folder; {right}", path.display())));
+    }
     if !path.is_dir() {
         return Ok(path.to_owned());
     }

@@ -3,7 +3,7 @@
 use crate::{Error, Result};
 use glam::{DQuat, DVec3};
 use std::path::Path;
-use trocar_cell::{ToolReach, tool_reach};
+use trocar_cell::{ToolReach, check_starts, tool_reach};
 use trocar_core::Pose;
 use trocar_scene::{
     Arm, CellCamera, Frame, Gates, Instrument, InstrumentKind, Lens, Safety, SafetyRules, Scene, Side, SpecimenSource,
@@ -112,7 +112,9 @@ pub fn cell_scene(specimen: &Specimen, folder: &Path, organ: &str, name: &str) -
             break;
         }
     }
-    best.ok_or_else(|| Error::Mismatch("the specimen cannot be placed".to_owned()))
+    let (scene, reach) = best.ok_or_else(|| Error::Mismatch("the specimen cannot be placed".to_owned()))?;
+    check_starts(&scene, specimen)?;
+    Ok((scene, reach))
 }
 
 /// A grasp-lift of `organ` at any place along it, until its policy has finished.

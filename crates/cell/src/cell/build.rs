@@ -21,7 +21,7 @@ const MIN_CLEARANCE: f64 = 2e-5;
 
 /// Minimum depth of the jaw's pivot in the body, and minimum height of the shaft's base outside
 /// (m).
-const MARGIN: f64 = 0.02;
+pub(super) const MARGIN: f64 = 0.02;
 
 /// The blades' tips stay this far above the lowest tissue (m).
 const ABOVE_FLOOR: f64 = 0.001;
@@ -70,24 +70,17 @@ pub(super) fn design(name: GraspDesignName) -> GraspDesign {
 }
 
 /// The arms of a scene, the left one first, over tissue whose lowest node is at height `floor` (m).
+/// Starts beyond a limit are put at it; [`start::check`](super::start::check) refuses them.
 pub(super) fn arms(scene: &Scene, floor: f64) -> Result<Vec<ArmUnit>> {
     scene.tools().iter().enumerate().map(|(k, tool)| arm(scene, k, tool, floor)).collect()
 }
 
 fn arm(scene: &Scene, k: usize, tool: &Tool<'_>, floor: f64) -> Result<ArmUnit> {
     let (arm, held) = (tool.arm, tool.instrument);
-    let closing = CLOSING[usize::from(held.kind == InstrumentKind::Cutter)];
-    let blades = Blades {
-        length: 1e-3 * held.blade_length_mm,
-        ridges: if held.kind == InstrumentKind::Cutter { 1 } else { 3 },
-        max_angle: held.jaw_max_angle_deg.to_radians(),
-        shaft_radius: 0.5e-3 * held.shaft_diameter_mm,
-        shaft_length: (1e-3 * held.shaft_length_mm).min(MAX_TOUCHED_SHAFT),
-        rest_offset: 1e-3 * scene.tissue.tip_rest_offset_mm,
-        friction: scene.tissue.friction,
-    };
+    let closing = closing(held);
+    let blades = blades(scene, held);
     let mut workspace = workspace(tool, closing, &blades, floor)?;
-    let start = checked_start(scene, tool, &workspace)?;
+    let start = workspace.clamp(&start(&arm.start, tool.port, &workspace));
     let drive = match (&mut workspace, arm.drive) {
         (Workspace::Port(space), DriveKind::Dynamics) => dynamic(scene, arm, space, &start)?,
         _ => {
@@ -118,6 +111,28 @@ fn arm(scene: &Scene, k: usize, tool: &Tool<'_>, floor: f64) -> Result<ArmUnit> 
     Ok(ArmUnit { model, drive, state })
 }
 
+/// The time that the instrument's jaws take from open to closed (s).
+fn closing(held: &trocar_scene::Instrument) -> f64 {
+    CLOSING[usize::from(held.kind == InstrumentKind::Cutter)]
+}
+
+fn blades(scene: &Scene, held: &trocar_scene::Instrument) -> Blades {
+    Blades {
+        length: 1e-3 * held.blade_length_mm,
+        ridges: if held.kind == InstrumentKind::Cutter { 1 } else { 3 },
+        max_angle: held.jaw_max_angle_deg.to_radians(),
+        shaft_radius: 0.5e-3 * held.shaft_diameter_mm,
+        shaft_length: (1e-3 * held.shaft_length_mm).min(MAX_TOUCHED_SHAFT),
+        rest_offset: 1e-3 * scene.tissue.tip_rest_offset_mm,
+        friction: scene.tissue.friction,
+    }
+}
+
+/// The workspace of a tool over tissue whose lowest node is at height `floor` (m).
+pub(super) fn workspace_of(scene: &Scene, tool: &Tool<'_>, floor: f64) -> Result<Workspace> {
+    workspace(tool, closing(tool.instrument), &blades(scene, tool.instrument), floor)
+}
+
 /// The workspace of the instrument: its port, or a box around its start.
 fn workspace(tool: &Tool<'_>, closing: f64, blades: &Blades, floor: f64) -> Result<Workspace> {
     let Some(port) = tool.port else {
@@ -132,20 +147,6 @@ fn workspace(tool: &Tool<'_>, closing: f64, blades: &Blades, floor: f64) -> Resu
     let limits = limits(&hole, &instrument, blades, floor)?;
     let blade_length = blades.length;
     Ok(Workspace::Port(Box::new(PortSpace { port: hole, instrument, limits, floor, blade_length })))
-}
-
-/// The start, within the limits.
-fn checked_start(scene: &Scene, tool: &Tool<'_>, workspace: &Workspace) -> Result<Setpoint> {
-    let start = start(&tool.arm.start, tool.port, workspace);
-    let Workspace::Port(space) = workspace else { return Ok(workspace.clamp(&start)) };
-    let (start, beyond) = space.limits.clamp(&start.in_port());
-    if let Some((limit, excess)) = beyond.binding().next() {
-        let reason =
-            format!("is beyond the {limit} that the port and the tissue below it allow, by {excess:.4} (m or rad)");
-        let field = format!("arm '{}', start", tool.arm.name.name());
-        return Err(Error::Scene { scene: scene.name.clone(), field, reason });
-    }
-    Ok(start.into())
 }
 
 /// The controlled arm of a scene. Narrows the rolls of `space` to those that it reaches.
@@ -287,7 +288,7 @@ fn chain(scene: &Scene, arm: &trocar_scene::Arm) -> Result<SerialArm> {
         Some(Source::Urdf(file)) => SerialArm::from_urdf(&scene.resolve(file), None, flange)?,
         Some(Source::Mjcf(file)) => {
             let tip = flange.ok_or_else(|| Error::Scene {
-                scene: scene.name.clone(),
+                scene: scene.label(),
                 field: format!("arm '{}', flange", arm.name.name()),
                 reason: "is missing; an MJCF file needs it: the body or site that carries the instrument".to_owned(),
             })?;

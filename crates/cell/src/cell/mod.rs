@@ -28,6 +28,7 @@ mod settle;
 mod shadow;
 mod solid;
 mod speeds;
+mod start;
 mod state;
 mod workspace;
 
@@ -43,6 +44,7 @@ pub use setpoint::Setpoint;
 pub use settle::Settling;
 pub use shadow::Moment;
 pub use speeds::{ROLL_SPEED, SWING_SPEED, TIP_SPEED};
+pub use start::check_starts;
 pub use state::CellState;
 pub use workspace::{FreeSpace, PortSpace, Reached, Workspace};
 
@@ -88,6 +90,22 @@ impl Default for ContactParts {
 }
 
 /// A cell.
+///
+/// ```
+/// use trocar_cell::{Action, Cell};
+/// # let (scene, specimen) = (trocar_testing::tube::resection(), trocar_testing::tube::meshed(trocar_testing::tube::ONE_END, 4e-3));
+///
+/// let mut cell = Cell::new(&scene, &specimen, 1)?;
+/// let start: Vec<_> = cell.observe().iter().map(|arm| arm.commanded).collect();
+/// let mut targets = start.clone();
+/// // The five numbers of an arm in a port: two pivots, insertion, roll, jaw opening.
+/// targets.iter_mut().for_each(|target| target.0[2] += 0.002);
+/// for _ in 0..10 {
+///     cell.step(&Action::targets(&targets))?;
+/// }
+/// assert!(cell.observe()[0].measured.0[2] > start[0].0[2] + 0.001, "the left arm went deeper");
+/// # Ok::<(), trocar_cell::Error>(())
+/// ```
 pub struct Cell {
     world: World,
     arms: Vec<ArmUnit>,
@@ -135,7 +153,9 @@ impl Cell {
     /// As [`Cell::new`].
     pub fn with_contact(scene: &Scene, specimen: &Specimen, threads: usize, contact: ContactParts) -> Result<Self> {
         let (frames, physics_steps) = rates(scene)?;
-        let Placed { specimen, mut surroundings, floor } = Placed::new(scene, specimen)?;
+        let placed = Placed::new(scene, specimen)?;
+        start::check(scene, &placed)?;
+        let Placed { specimen, mut surroundings, floor } = placed;
         let bed = surroundings.bed_friction.map(|_| floor);
         let arms = build::arms(scene, floor)?;
         let colliders = arms.iter().flat_map(|s| s.model.blades.colliders(s.model.tools));
@@ -226,7 +246,7 @@ impl Cell {
 /// Tissue frames a control period and physics steps a frame.
 fn rates(scene: &Scene) -> Result<(u32, u32)> {
     let rates = scene.rates;
-    let wrong = |field: &str, reason: String| Error::Scene { scene: scene.name.clone(), field: field.into(), reason };
+    let wrong = |field: &str, reason: String| Error::Scene { scene: scene.label(), field: field.into(), reason };
     if rates.control_hz == 0 || !FRAMES_HZ.is_multiple_of(rates.control_hz) {
         let reason =
             format!("is {}; it must divide {FRAMES_HZ}, tissue's frames a second: 30, 20, 60", rates.control_hz);

@@ -34,7 +34,7 @@ impl Placed {
         for organ in &mut placed.organs {
             move_organ(organ, &pose);
         }
-        let wrong = |field: String, reason: String| Error::Scene { scene: scene.name.clone(), field, reason };
+        let wrong = |field: String, reason: String| Error::Scene { scene: scene.label(), field, reason };
         let find = |field: &dyn Fn() -> String, name: &str| {
             placed.organs.iter().position(|o| o.name == name).ok_or_else(|| {
                 let known: Vec<&str> = placed.organs.iter().map(|o| o.name.as_str()).collect();

@@ -43,7 +43,7 @@ pub struct Replay {
     #[arg(long)]
     pub verify: bool,
     /// Specimen folder, if it was moved from its place in the scene.
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(long, value_name = "FOLDER", requires = "verify")]
     pub specimen: Option<PathBuf>,
     /// Worker threads; all by default. The result does not depend on them.
     #[arg(long, default_value_t = 0)]

@@ -57,7 +57,9 @@ pub fn replay_file(arguments: &cli::Replay, json: bool, progress: &dyn Progress)
     }
     let specimen = arguments.specimen.as_deref();
     let verdict = replay(&arguments.file, specimen, &arguments.phantoms, arguments.threads, progress)?;
-    output::print(json, &verdict, |v| if v.same { format!("the same: {}", v.said) } else { v.said.clone() });
+    if json || verdict.same {
+        output::print(json, &verdict, |v| format!("the same: {}", v.said));
+    }
     if verdict.same {
         return Ok(());
     }
@@ -85,7 +87,10 @@ fn text(made: &EpisodeOutput) -> String {
         None => format!("{} {:.0}%", p.stage, 100.0 * p.share),
     });
     let mut remarks = String::new();
-    for said in [&s.why, &s.advice].into_iter().flatten() {
+    let end = s.end.as_ref().map_or("no end".to_owned(), ToString::to_string);
+    // The reason of some ends is the end itself.
+    let why = s.why.as_ref().filter(|why| **why != end);
+    for said in why.into_iter().chain(&s.advice) {
         remarks += &format!("\n{said}");
     }
     if let Some(said) = s.warnings.described() {
@@ -105,12 +110,12 @@ fn text(made: &EpisodeOutput) -> String {
         r.task,
         r.policy,
         r.seed,
-        s.end.as_ref().map_or("no end".to_owned(), ToString::to_string),
+        end,
         s.stage,
         s.progress.stages.len(),
         stages.collect::<Vec<_>>().join(", "),
         s.inverted_peak,
-        s.arms.iter().map(arm).collect::<Vec<_>>().join("\n"),
+        s.arms.iter().map(|a| arm(a, s.duration_s > 0.0)).collect::<Vec<_>>().join("\n"),
         s.duration_s,
         made.wall_s,
         made.real_time_factor,
@@ -120,7 +125,11 @@ fn text(made: &EpisodeOutput) -> String {
     )
 }
 
-fn arm(a: &ArmSummary) -> String {
+/// A line for an arm; `moved` says whether any time was simulated.
+fn arm(a: &ArmSummary, moved: bool) -> String {
+    if !moved {
+        return format!("{}: nothing was measured", a.arm);
+    }
     let lag = a.lag_ms.map_or("lag not measured".to_owned(), |lag| format!("lag {lag:.0} ms"));
     format!(
         "{}: {}; {lag}; peak contact {:.2} N, peak constraint {:.2} N",

@@ -63,10 +63,10 @@ pub fn text(r: &Reconstructed) -> String {
         );
         if let Some(t) = &c.truth {
             out += &format!(
-                "\nagainst the truth: depth error {:.2} mm (median; 95% below {:.2}), {} mm under the instruments",
+                "\nagainst the truth: depth error {:.2} mm (median; 95% below {:.2}){}",
                 t.depth_error_median_mm,
                 t.depth_error_p95_mm,
-                t.under_instruments_median_mm.map_or("-".to_owned(), |e| format!("{e:.2}"))
+                t.under_instruments_median_mm.map_or(String::new(), |e| format!(", {e:.2} mm under the instruments"))
             );
         }
     }

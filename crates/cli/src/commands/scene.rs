@@ -4,7 +4,7 @@ use crate::cli::{Scene as Arguments, SceneAction};
 use crate::output;
 use serde::Serialize;
 use std::path::Path;
-use trocar_cell::{ToolReach, tool_reach};
+use trocar_cell::{ToolReach, check_starts, tool_reach};
 use trocar_scene::{BUILTINS, Builtin, InstrumentKind, Scene, Source};
 use trocar_specimen::Specimen;
 use trocar_workflow::specimen_scene::{cell_scene, task_organ};
@@ -113,13 +113,19 @@ pub fn note_reach(name: &str) {
 
 fn check(file: &str, json: bool) -> Result<()> {
     let scene = Scene::read(file)?;
-    let reach = match scene.specimen.source() {
+    let specimen = match scene.specimen.source() {
         // Where organs of others come to lie is known when the specimen is made.
-        Some(Source::Folder(path)) if scene.needs_organ() && scene.specimen.swapped.is_empty() => {
-            tool_reach(&scene, &Specimen::read(&scene.resolve(path))?)?
-        }
+        Some(Source::Folder(path)) if scene.specimen.swapped.is_empty() => Some(Specimen::read(&scene.resolve(path))?),
+        _ => None,
+    };
+    let reach = match &specimen {
+        Some(specimen) if scene.needs_organ() => tool_reach(&scene, specimen)?,
         _ => Vec::new(),
     };
+    // An organ out of reach is the reason why an arm cannot start, so it is reported first.
+    if let Some(specimen) = specimen.filter(|_| reach.iter().all(ToolReach::reaches)) {
+        check_starts(&scene, &specimen)?;
+    }
     let organ = scene.task.organ.clone();
     let checked = Checked {
         task: scene.task.name.name().to_owned(),

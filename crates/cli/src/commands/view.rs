@@ -31,6 +31,8 @@ pub fn run(arguments: &cli::View, json: bool, progress: &dyn Progress) -> Result
     if speed != 0.0 && !(0.125..=8.0).contains(&speed) {
         return Err(Error::Mismatch(format!("--speed {speed}: it must be in [0.125, 8], or 0")));
     }
+    let source = Source::of(&arguments.source);
+    source.check().map_err(wrong)?;
     let left = Arc::<AtomicBool>::default();
     if arguments.until_eof {
         let left = Arc::clone(&left);
@@ -44,7 +46,7 @@ pub fn run(arguments: &cli::View, json: bool, progress: &dyn Progress) -> Result
     let missing = build_page();
     progress.end();
     let server = Server::start(Options {
-        source: Source::of(&arguments.source),
+        source,
         building: Building {
             phantoms: arguments.phantoms.clone(),
             threads: arguments.threads,

@@ -57,6 +57,22 @@ use trocar_tissue::{Body, Model, ToolForce, ToolMotion};
 
 /// Finds converged steps and equilibria of one model. It keeps the symbolic factorisations from
 /// step to step while the same nodes are held.
+///
+/// ```
+/// use glam::DVec3;
+/// use trocar_testing::blocks::{block, model, nodes, tissue};
+/// use trocar_tissue_reference::{Oracle, OracleState};
+///
+/// // A bar of 40 mm that hangs from one end.
+/// let mesh = block([4, 1, 1], 0.01);
+/// let held = nodes(&mesh, |p| p.x < 1e-6);
+/// let model = model(&mesh, tissue(10e3), held, DVec3::Z * -9.81);
+/// let mut state = OracleState::new(&model);
+/// let found = Oracle::new(&model).settle(&model, &mut state, &[])?;
+/// assert_eq!(found.len(), 1, "one body");
+/// assert!(state.positions(0).iter().any(|p| p.z < -1e-4), "it sags");
+/// # Ok::<(), trocar_tissue_reference::Error>(())
+/// ```
 pub struct Oracle {
     groups: Vec<Group>,
     forces: Vec<ToolForce>,

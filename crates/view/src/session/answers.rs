@@ -1,7 +1,7 @@
 //! What a session does for its clients.
 
+use super::Session;
 use super::status::Telling;
-use super::{Session, folder_of};
 use crate::error::Error;
 use crate::inbox::{Request, Wish};
 use crate::outbox::Outgoing;
@@ -126,7 +126,7 @@ impl Session {
 
     /// The folder of the table: the one that is shown, or that of the recordings.
     fn folder(&self) -> Option<Folder> {
-        folder_of(&self.plan).or_else(|| self.recorder.as_ref().map(|r| Folder::Demonstrations(r.folder.clone())))
+        self.plan.source.folder().or_else(|| self.recorder.as_ref().map(|r| Folder::Demonstrations(r.folder.clone())))
     }
 
     fn open(&mut self, id: String) -> std::result::Result<(), Mistake> {

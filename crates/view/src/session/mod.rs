@@ -90,7 +90,7 @@ impl Session {
             Source::Specimen(folder) => plan.building.specimen(folder, &telling)?,
             Source::Episode(path) => plan.building.episode(path, &telling)?,
             Source::Campaign(_) | Source::Demonstrations(_) => {
-                let folder = folder_of(&plan);
+                let folder = plan.source.folder();
                 let first = folder.as_ref().and_then(Folder::first);
                 let path = first.as_ref().and_then(|id| folder.as_ref()?.episode(id));
                 let path = path.ok_or_else(|| Error::Source(format!("{}: has no episode", plan.source.name())))?;
@@ -227,13 +227,5 @@ impl Session {
         let message = crate::measured::message(&show.episode, show.at, shown, |arm| show.actor(arm))?;
         due.iter().for_each(|client| client.reply(message.clone()));
         Ok(())
-    }
-}
-
-fn folder_of(plan: &Plan) -> Option<Folder> {
-    match &plan.source {
-        Source::Campaign(path) => Some(Folder::Campaign(path.clone())),
-        Source::Demonstrations(path) => Some(Folder::Demonstrations(path.clone())),
-        _ => None,
     }
 }

@@ -65,6 +65,9 @@ fn cards(recording: &Recording, real_time_factor: f64) -> String {
             cards.push(Card::new("Slip", mm(slip), "of held tissue in the jaws"));
         }
     }
+    if s.duration_s == 0.0 {
+        return page::cards(&cards);
+    }
     let threshold = recording.info.rcm_threshold_mm;
     let within = Card::new("RCM deviation", mm(s.rcm_peak_mm), format!("at most; the threshold is {threshold} mm"));
     cards.push(within.met(s.rcm_within));
@@ -93,6 +96,9 @@ fn stages(s: &Summary) -> String {
 }
 
 fn arms(recording: &Recording) -> String {
+    if recording.summary.duration_s == 0.0 {
+        return String::new();
+    }
     let table = Table::of(
         &recording.summary.arms,
         &[
