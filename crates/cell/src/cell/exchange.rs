@@ -72,6 +72,11 @@ impl Exchange {
         self.load.force
     }
 
+    /// The force (N), and the torque about the tip (N m), at the end of the last frame.
+    pub fn wrench(&self) -> Wrench {
+        self.load
+    }
+
     /// The stiffness seen so far (N/m).
     pub fn stiffness(&self) -> f64 {
         self.stiffness
