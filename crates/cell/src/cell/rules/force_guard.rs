@@ -42,7 +42,7 @@ const DEADBAND: f64 = 0.02;
 /// Minimum and maximum assumed stiffness of tissue (N/m).
 const STIFFNESS: [f64; 2] = [2e3, 5e4];
 
-/// Speed aside at the limit (m/s).
+/// Speed aside at the limit (m/s); beyond it there is none.
 const CREEP: f64 = 0.01;
 
 /// A motion of which more than this share goes away from the load is a retreat.
@@ -168,9 +168,10 @@ impl ForceGuard {
         // Beyond the limit this is negative: the minimum retraction.
         let most = (gain * room / self.stiffness.clamp(STIFFNESS[0], stiffest)).clamp(-RETREAT, fastest);
         if size > FROM_SHARE * limit {
-            // Beside what presses there may be something harder.
-            let left = ((limit - size) / ((1.0 - FROM_SHARE) * limit)).max(0.0);
-            aside = aside.clamp_length_max(period * (CREEP + left * (FASTEST_TOUCH - CREEP)));
+            // Beside what presses there may be something harder. Beyond the limit it only retracts.
+            let left = (limit - size) / ((1.0 - FROM_SHARE) * limit);
+            let speed = if left < -DEADBAND { 0.0 } else { CREEP + left.max(0.0) * (FASTEST_TOUCH - CREEP) };
+            aside = aside.clamp_length_max(period * speed);
         }
         let allowed = against.min(most);
         if allowed == against && aside == way + against * out { way } else { aside - allowed * out }
