@@ -17,9 +17,6 @@ use glam::{DMat3, DVec3, Mat3A, Vec3A};
 /// to the rest shape to end in it.
 const REPAIRED_VOLUME_RATIO: f32 = 0.6;
 
-/// Greatest stretch of an edge then, if the body was to be relaxed.
-const REPAIRED_STRETCH: f32 = 1.5;
-
 /// Sweeps between two checks of the elements, and greatest number of checks a frame.
 const SWEEPS_PER_CHECK: usize = 5;
 const MAX_CHECKS: usize = 100;
@@ -36,17 +33,14 @@ impl Untangler {
         Self { rest: rest.x.clone(), fixed: vec![false; rest.x.len()] }
     }
 
-    /// Repairs a disturbed body if one of its elements is inverted or it is to be relaxed, as far
-    /// as one frame's effort goes. The body is at rest afterwards. Pinned and held nodes stay.
+    /// Repairs a disturbed body if one of its elements is inverted, as far as one frame's effort
+    /// goes. The body is at rest afterwards. Pinned and held nodes stay.
     pub fn untangle(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
-        if !state.repair.disturbed {
+        if !std::mem::take(&mut state.disturbed) {
             return;
         }
-        state.repair.disturbed = false;
-        let relaxes = std::mem::take(&mut state.repair.relax);
-        let wrong = relaxes || least_ratio(body, &state.x) <= 0.0;
         // The report finds numbers that are not finite.
-        if !(wrong && state.x.iter().all(|x| x.is_finite())) {
+        if !(least_ratio(body, &state.x) <= 0.0 && state.x.iter().all(|x| x.is_finite())) {
             return;
         }
         for (fixed, vertex) in self.fixed.iter_mut().zip(&body.vertices) {
@@ -58,19 +52,14 @@ impl Untangler {
         let turn = self.rotation(body, &state.x);
         for _ in 0..MAX_CHECKS {
             (0..SWEEPS_PER_CHECK).for_each(|_| self.sweep(body, turn, &mut state.x));
-            if least_ratio(body, &state.x) > REPAIRED_VOLUME_RATIO && !(relaxes && is_stretched(body, &state.x)) {
+            if least_ratio(body, &state.x) > REPAIRED_VOLUME_RATIO {
                 break;
             }
         }
         state.v.fill(Vec3A::ZERO);
         state.warm.falling.fill(0.0);
-        if relaxes {
-            // Friction does not pull the tissue back.
-            state.anchors.clear();
-            state.stretches.clear();
-        }
         // What one frame did not repair continues in the next.
-        state.repair.disturbed = least_ratio(body, &state.x) <= 0.0;
+        state.disturbed = least_ratio(body, &state.x) <= 0.0;
     }
 
     /// Moves each vertex in turn to its minimum: the mean of where its neighbours want it.
@@ -134,16 +123,6 @@ fn fit(body: &Body, rest: &[Vec3A], x: &[Vec3A], counts: impl Fn(usize) -> bool)
     Mat3A::from_quat(glam::DQuat::from_xyzw(x, y, z, w).as_quat())
 }
 
-/// Whether an edge is longer than [`REPAIRED_STRETCH`] times its rest length.
-fn is_stretched(body: &Body, x: &[Vec3A]) -> bool {
-    let too_long = |i: usize| {
-        let long =
-            |e: &crate::body::Edge| (x[e.to as usize] - x[i]).length_squared() > (REPAIRED_STRETCH * e.length).powi(2);
-        body.edges_of(i).iter().any(long)
-    };
-    (0..x.len()).any(too_long)
-}
-
 fn least_ratio(body: &Body, x: &[Vec3A]) -> f32 {
     let ratios = body.tets.iter().zip(&body.volumes).map(|(tet, volume)| volume_ratio(tet, x, *volume as f32));
     ratios.fold(f32::INFINITY, f32::min)
@@ -154,43 +133,6 @@ mod tests {
     use super::*;
     use crate::{BodyDescription, ConstitutiveModel, Material, ModelBuilder, State};
     use trocar_geometry::TetMesh;
-
-    #[test]
-    fn what_is_stretched_is_put_right_when_it_is_asked_for() {
-        let model = tet();
-        let frame = Frame {
-            dt: 1.0 / 60.0,
-            gravity: DVec3::ZERO,
-            index: 0,
-            grasps: &[],
-            holes: &[],
-            tools: &[],
-            loads: &[],
-            colliders: &[],
-            tool_contact: crate::ToolContact::Vertices,
-            single_thread: true,
-        };
-        let body = &model.bodies[0];
-        let rest = State::new(&model);
-        let mut stretched = rest.bodies[0].clone();
-        stretched.x.iter_mut().for_each(|x| x.x *= 6.0);
-        stretched.repair.disturbed = true;
-        let mut untangler = Untangler::new(&rest.bodies[0]);
-        let mut left = stretched.clone();
-        untangler.untangle(&frame, body, &mut left);
-        assert_eq!(left.x, stretched.x, "no element is inverted");
-        let mut state = rest;
-        state.bodies[0] = stretched;
-        state.relax(0);
-        untangler.untangle(&frame, body, &mut state.bodies[0]);
-        let now = &state.bodies[0];
-        assert!(
-            !is_stretched(body, &now.x)
-                && least_ratio(body, &now.x) > REPAIRED_VOLUME_RATIO
-                && !now.repair.disturbed
-                && !now.repair.relax
-        );
-    }
 
     fn tet() -> crate::Model {
         let p = |x: f64, y: f64, z: f64| 1e-2 * DVec3::new(x, y, z);

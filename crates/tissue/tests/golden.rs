@@ -129,7 +129,7 @@ fn bodies_and_tools_that_touch() {
     check("bodies and tools that touch", found, [0x4c4bb30ea75aa11d, 0xc18d125f22a6087f, 0xdcff47f959a781f0]);
 }
 
-/// Loads, a state with inverted elements, and one that is to be relaxed.
+/// Loads, a state with inverted elements, and one that is stretched.
 #[test]
 fn loads_and_disturbed_states() {
     let (model, mut state) = touching_bodies();
@@ -142,11 +142,10 @@ fn loads_and_disturbed_states() {
         let x = state.position(&model, 1, node);
         state.set_position(&model, 1, node, DVec3::new(1.3 * x.x, x.y, x.z));
     }
-    state.relax(1);
     let loads = [(0, 40, DVec3::new(0.01, 0.0, 0.02)), (2, 5, DVec3::new(0.0, 1e-3, 1e-3))];
     let loads = loads.map(|(body, node, force)| Load { body, node, force });
     let found = hashes(&model, &state, 20, &lift_and_probe, &loads);
-    check("loads and disturbed states", found, [0x1e555384261ad5d6, 0x2aefa14452e87d5c, 0x11524cd02abb7122]);
+    check("loads and disturbed states", found, [0x2d7f9c5a8f18dcce, 0x56f090149b7838c4, 0x79ad099b044b933c]);
 }
 
 /// A block that a rigid grasp crushes.

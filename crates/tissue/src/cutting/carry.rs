@@ -162,7 +162,7 @@ fn motion(whole: &Body, state: &BodyState, piece: &Body, nodes: &[u32]) -> BodyS
         // Cut tissue settles against its neighbours and tools from the beginning.
         feature_anchors: Vec::new(),
         stretches: Vec::new(),
-        repair: state.repair,
+        disturbed: state.disturbed,
         warm: WarmStart {
             falling: from.iter().map(|i| state.warm.falling[*i]).collect(),
             supported: from.iter().map(|i| state.warm.supported[*i]).collect(),

@@ -13,7 +13,6 @@ mod terms;
 use crate::body_slot::{BodySlot, IslandFrame, Solver};
 use crate::contact::ContactSet;
 use crate::frame::Frame;
-use crate::state::Repair;
 use crate::{Body, QuasiNewton, SolverSettings, ToolForce};
 use glam::DVec3;
 use minimise::{Island, Precision};
@@ -84,12 +83,7 @@ impl Solver for LatticeSolver {
     fn begin_frame(island: &mut IslandFrame<'_, Self>) {
         for BodySlot { index, body, solver, state, .. } in island.slots.iter_mut() {
             let frame = island.frame.of(*index);
-            if state.repair.relax {
-                // Friction does not pull the tissue back.
-                state.anchors.clear();
-                state.stretches.clear();
-            }
-            state.repair = Repair::default();
+            state.disturbed = false;
             if let (Some(embedding), Some(lattice)) = (&body.lattice, &mut state.lattice) {
                 embedding.follow(lattice, &mut state.x, &mut state.v);
             }

@@ -19,8 +19,9 @@ pub(crate) struct BodyState {
     pub feature_anchors: Vec<FeatureAnchor>,
     /// Stretch of friction's springs to other bodies, by vertex and body.
     pub stretches: Vec<Stretch>,
-    /// The repair before the next frame.
-    pub repair: Repair,
+    /// Nodes were moved from outside: elements may be inverted by it, and are repaired before the
+    /// next frame.
+    pub disturbed: bool,
     /// The solvers' warm start.
     pub warm: WarmStart,
     /// Nodes of the body's lattice, relative to the body's origin, which vertices follow; None
@@ -43,15 +44,6 @@ pub(crate) struct WarmStart {
     pub supported: Vec<bool>,
 }
 
-/// A request to repair a body before the next frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Repair {
-    /// Nodes were moved from outside; elements may be inverted by it.
-    pub disturbed: bool,
-    /// The body is to be relaxed even if no element is inverted.
-    pub relax: bool,
-}
-
 impl BodyState {
     /// At rest in the rest shape.
     pub fn at_rest(body: &Body) -> Self {
@@ -65,7 +57,7 @@ impl BodyState {
             anchors: Vec::with_capacity(2 * body.surface_vertices().len()),
             feature_anchors: Vec::new(),
             stretches: Vec::new(),
-            repair: Repair::default(),
+            disturbed: false,
             warm: WarmStart { falling: vec![0.0; body.len()], supported: vec![false; body.len()] },
             lattice: body.lattice.as_ref().map(|lattice| lattice.at_rest()),
         }
@@ -74,14 +66,14 @@ impl BodyState {
     /// Copies another state of the same body without allocating. Destructuring names every field:
     /// a new one that is not copied does not compile.
     pub fn copy_from(&mut self, other: &Self) {
-        let Self { x, v, anchors, feature_anchors, stretches, repair, warm, lattice } = other;
+        let Self { x, v, anchors, feature_anchors, stretches, disturbed, warm, lattice } = other;
         let WarmStart { falling, supported } = warm;
         self.x.copy_from_slice(x);
         self.v.copy_from_slice(v);
         self.anchors.clone_from(anchors);
         self.feature_anchors.clone_from(feature_anchors);
         self.stretches.clone_from(stretches);
-        self.repair = *repair;
+        self.disturbed = *disturbed;
         self.warm.falling.copy_from_slice(falling);
         self.warm.supported.copy_from_slice(supported);
         self.lattice.clone_from(lattice);
@@ -90,9 +82,8 @@ impl BodyState {
     /// Hashes every bit. Destructuring names every field: a new one that is not hashed does not
     /// compile.
     pub fn hash(&self, hash: &mut Xxh3) {
-        let Self { x, v, anchors, feature_anchors, stretches, repair, warm, lattice } = self;
+        let Self { x, v, anchors, feature_anchors, stretches, disturbed, warm, lattice } = self;
         let WarmStart { falling, supported } = warm;
-        let Repair { disturbed, relax } = repair;
         for vector in x.iter().chain(v) {
             hash_vector(hash, *vector);
         }
@@ -120,7 +111,8 @@ impl BodyState {
             [vertex, other].iter().for_each(|k| hash.update(&k.to_le_bytes()));
             hash_vector(hash, *by);
         }
-        for flag in supported.iter().chain([disturbed, relax]) {
+        // The last flag is that of a request that no longer exists: hashes stay those of before.
+        for flag in supported.iter().chain([disturbed, &false]) {
             hash.update(&[u8::from(*flag)]);
         }
         if let Some(LatticeState { positions, velocities }) = lattice {

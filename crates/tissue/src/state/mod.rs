@@ -7,7 +7,7 @@ mod motion;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use body_state::{BodyState, Repair, WarmStart};
+pub(crate) use body_state::{BodyState, WarmStart};
 pub(crate) use friction::{Anchor, FeatureAnchor, FeatureKey, Source, Stretch};
 pub use motion::BodyMotion;
 
@@ -112,16 +112,7 @@ impl State {
     pub fn set_position(&mut self, model: &Model, body: usize, node: usize, position: DVec3) {
         let b = &model.bodies[body];
         self.bodies[body].x[b.internal[node] as usize] = (position - b.origin).as_vec3a();
-        self.bodies[body].repair.disturbed = true;
-    }
-
-    /// Requests that a body be relaxed at the beginning of the next step, without regard to time
-    /// and forces: towards the rest shape, rotated to fit, until no element is squeezed and no edge
-    /// is stretched much. It is for tissue so folded that its elements lock each other. Pinned and
-    /// held nodes stay.
-    pub fn relax(&mut self, body: usize) {
-        self.bodies[body].repair.disturbed = true;
-        self.bodies[body].repair.relax = true;
+        self.bodies[body].disturbed = true;
     }
 
     /// Sets the velocity of a node (m/s); a pinned or held node keeps none.

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
 use super::State;
-use super::body_state::{BodyState, Repair, WarmStart};
+use super::body_state::{BodyState, WarmStart};
 use super::{Anchor, FeatureAnchor, Source, Stretch};
 use crate::{
     Backend, BodyDescription, Compliance, ConstitutiveModel, Grasp, Hole, LatticeSettings, Material, Model,
@@ -76,11 +76,10 @@ fn vectors(list: fn(&mut BodyState) -> &mut Vec<Vec3A>, vertices: usize) -> Vec<
 /// A change of each number of the body's state. Destructuring names every field: a new one that has
 /// no change here does not compile.
 fn body_changes(body: &BodyState) -> Vec<Change> {
-    let BodyState { x, v, anchors, feature_anchors, stretches, repair, warm, lattice } = body;
-    let Repair { disturbed, relax } = repair;
+    let BodyState { x, v, anchors, feature_anchors, stretches, disturbed, warm, lattice } = body;
     let WarmStart { falling, supported } = warm;
     let mut all = vectors(|body| &mut body.x, x.len());
-    assert!(!*disturbed && !*relax && anchors.len() == 1 && stretches.len() == 1);
+    assert!(!*disturbed && anchors.len() == 1 && stretches.len() == 1);
     let [FeatureAnchor { collider: _, feature: _, stretch: _, weights: _ }] = feature_anchors[..] else {
         panic!("one is there")
     };
@@ -108,8 +107,7 @@ fn body_changes(body: &BodyState) -> Vec<Change> {
         all.push(change(move |s| s.bodies[0].lattice.as_mut().unwrap().positions[i][c] += 1.0));
         all.push(change(move |s| s.bodies[0].lattice.as_mut().unwrap().velocities[i][c] += 1.0));
     }
-    all.push(change(|s| s.bodies[0].repair.disturbed ^= true));
-    all.push(change(|s| s.bodies[0].repair.relax ^= true));
+    all.push(change(|s| s.bodies[0].disturbed ^= true));
     all
 }
 

@@ -4,7 +4,7 @@ use super::ArmModel;
 use crate::bite::Bite;
 use crate::cell::exchange::Exchange;
 use crate::cell::pressed::Pressed;
-use crate::cell::rules::ForceGuard;
+use crate::cell::rules::{ForceGuard, place};
 use crate::cell::setpoint::Setpoint;
 use crate::cell::solid::SolidLoad;
 use crate::hold::Hold;
@@ -115,7 +115,7 @@ impl ArmState {
             wanted: Wanted::Setpoint(start, DVec3::ZERO),
             commanded: start,
             held_back: false,
-            guard: ForceGuard::new(pose.translation),
+            guard: ForceGuard::new(place(pose.translation, start.roll())),
             guarded: false,
             gripper: Gripper { pose, jaw_angle: start.jaw() * model.blades.max_angle },
             design,

@@ -6,6 +6,7 @@ use crate::cell::Cell;
 use crate::cell::action::Action;
 use crate::cell::arm::{ArmUnit, Wanted};
 use crate::cell::report::PeriodLog;
+use crate::cell::rules::{place, tip_and_roll};
 use crate::cell::setpoint::NUMBERS;
 use crate::{Error, Result};
 
@@ -66,14 +67,16 @@ impl ArmUnit {
         let Wanted::Setpoint(wanted, _) = state.wanted else { return Ok(()) };
         let (paced, far) = space.paced(&state.commanded, &wanted, model.period);
         let (mut next, low) = space.above_floor(&paced);
-        let from = space.tip(&drive.reference()).translation;
+        let reference = drive.reference();
+        let from = place(space.tip(&reference).translation, reference.roll());
         let mut tip = space.tip(&next);
-        let way = tip.translation - from;
+        let way = place(tip.translation, next.roll()) - from;
         let allowed = state.guard.allow(way, model.force_limit, model.period);
         state.guarded = allowed != way;
         if state.guarded {
-            tip.translation = from + allowed;
-            next = space.solve(&tip, &next)?.setpoint.with_roll(next.roll());
+            let (translation, roll) = tip_and_roll(from + allowed);
+            tip.translation = translation;
+            next = space.solve(&tip, &next)?.setpoint.with_roll(roll);
         }
         let sent = drive.command(&next)?;
         (state.commanded, state.held_back) = (sent.setpoint, far || low || state.guarded || !sent.whole);

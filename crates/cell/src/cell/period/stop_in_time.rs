@@ -3,7 +3,8 @@
 use crate::World;
 use crate::cell::Cell;
 use crate::cell::arm::{ArmUnit, Wanted};
-use crate::cell::rules::{TissueAtArm, hit_ahead};
+use crate::cell::rules::{TissueAtArm, hit_ahead, load, place};
+use glam::DVec3;
 
 impl Cell {
     /// `tissue`: the strain of the tissue at each arm.
@@ -16,9 +17,14 @@ impl Cell {
 
 impl ArmUnit {
     fn stop_in_time(&mut self, world: &World, tissue: TissueAtArm) {
-        let Self { model, state, .. } = self;
-        let forces = [state.exchange.force(), state.solid.force()];
-        state.guard.end_frame(forces, tissue, state.gripper.pose.translation, model.force_limit);
+        let Self { model, drive, state } = self;
+        let pose = state.gripper.pose;
+        let shaft = pose.rotation * DVec3::X;
+        let loads = [state.exchange.wrench(), state.solid.wrench()].map(|wrench| load(wrench, shaft));
+        let at = place(pose.translation, drive.measured().0.roll());
+        let sent = drive.reference();
+        let reference = place(model.workspace.tip(&sent).translation, sent.roll());
+        state.guard.end_frame(loads, tissue, [at, reference], model.force_limit);
         if model.force_limit.is_finite() {
             let hit = hit_ahead(world, self, self.state.guard.motion());
             self.state.guard.expect(hit);

@@ -56,6 +56,11 @@ impl ArmUnit {
         }
         let force = opening_force(&state.gripper, Tools::of(0), &state.forces);
         if target < angle {
+            // One blade that presses pushes the arm, which has to yield first.
+            let blades = state.forces[1].contact.force + state.forces[2].contact.force;
+            if blades.length() > model.force_limit {
+                return angle;
+            }
             let free = state.jaw.squeeze(angle, force).max(target);
             let most = state.jaw.budget * model.blades.lever();
             return state.bite.as_mut().map_or(free, |bite| bite.close(angle, free, most));

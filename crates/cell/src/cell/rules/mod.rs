@@ -20,7 +20,7 @@ mod tissue_at_arm;
 mod watch;
 
 pub(super) use approach::hit_ahead;
-pub(super) use force_guard::ForceGuard;
+pub(super) use force_guard::{ForceGuard, load, place, tip_and_roll};
 pub(super) use strain::Edges;
 pub(super) use tissue_at_arm::TissueAtArm;
 pub(super) use watch::OrganWatch;

@@ -70,8 +70,8 @@ impl Solids {
                 for meeting in self.still(&arms[k], &arms[k].rods_at(tip)) {
                     arms[k].state.pressed.add(&meeting, Spring::at(meeting.gap, meeting.room).force());
                 }
-                let own = self.force_at(arms, k, tip, false);
-                arms[k].state.solid.add(own + given[k].force);
+                let own = self.wrench_at(arms, k, tip, false);
+                arms[k].state.solid.add(own + about(given[k], tip.translation));
             }
         }
         Ok(())
@@ -95,9 +95,9 @@ impl Solids {
         found
     }
 
-    /// The force at rest of solids on arm `k` with its tip frame at `tip` (N); other arms with
-    /// dynamics count if `all`.
-    fn force_at(&self, arms: &[ArmUnit], k: usize, tip: Pose, all: bool) -> DVec3 {
+    /// The force at rest (N) of solids on arm `k` with its tip frame at `tip`, and its torque about
+    /// the tip (N m); other arms with dynamics count if `all`.
+    fn wrench_at(&self, arms: &[ArmUnit], k: usize, tip: Pose, all: bool) -> Wrench {
         let rods = arms[k].rods_at(tip);
         let mut found = self.still(&arms[k], &rods);
         for (j, other) in arms.iter().enumerate() {
@@ -105,7 +105,8 @@ impl Solids {
                 found.extend(meetings(&rods, &other.rods_at(other.drive.tip())));
             }
         }
-        found.iter().map(|m| Spring::at(m.gap, m.room).force() * m.normal).sum()
+        let push = |m: &Meeting| Wrench::at(Spring::at(m.gap, m.room).force() * m.normal, m.point - tip.translation);
+        found.iter().map(push).fold(Wrench::default(), |sum, wrench| sum + wrench)
     }
 
     /// Moves ideal arm `k` until solids push it with the force limit, or no more than before.
@@ -120,7 +121,7 @@ impl Solids {
             arms[k].drive.restore(&saved)?;
             arms[k].drive.step_part(most, dt);
         }
-        let force = |arms: &[ArmUnit], tip: Pose| self.force_at(arms, k, tip, true).length();
+        let force = |arms: &[ArmUnit], tip: Pose| self.wrench_at(arms, k, tip, true).force.length();
         let limit = arms[k].model.stop_force;
         let pushed = force(arms, arms[k].drive.tip());
         if pushed <= limit {
@@ -176,13 +177,12 @@ impl Solids {
             Obstacle { point, normal, gap, stiffness, damping, speed, force: 0.0 }
         };
         let mut obstacles: Vec<Obstacle> = found.iter().map(obstacle).collect();
-        let Wrench { force, torque } = given[k];
-        let load = Wrench { force, torque: torque - tip.translation.cross(force) };
+        let load = about(given[k], tip.translation);
         arms[k].step(load, &mut obstacles, dt)?;
-        let mut sum = force;
+        let mut sum = load;
         for ((meeting, other), obstacle) in found.iter().zip(&obstacles) {
             let force = obstacle.force * meeting.normal;
-            sum += force;
+            sum += Wrench::at(force, meeting.point - tip.translation);
             arms[k].state.pressed.add(meeting, obstacle.force);
             if let Some(j) = other {
                 given[*j] += Wrench { force: -force, torque: meeting.point.cross(-force) };
@@ -191,6 +191,11 @@ impl Solids {
         arms[k].state.solid.add(sum);
         Ok(())
     }
+}
+
+/// The wrench about the cell's origin as one about `tip` (m).
+fn about(Wrench { force, torque }: Wrench, tip: DVec3) -> Wrench {
+    Wrench { force, torque: torque - tip.cross(force) }
 }
 
 /// Speed with which arm `k` comes nearer to what it may meet, arm `other` or the solid world (m/s).

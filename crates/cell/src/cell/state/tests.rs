@@ -9,7 +9,8 @@ use crate::cell::action::{Action, ActionSpace};
 use crate::cell::arm::{ArmState, Held, Wanted};
 use crate::hold::Hold;
 use crate::severance::Parting;
-use glam::DVec3;
+use glam::{DVec3, DVec4};
+use trocar_core::Wrench;
 use trocar_testing::tube::{self, ONE_END, specimen};
 use trocar_tissue::{Hole, ToolForce};
 
@@ -64,9 +65,9 @@ fn changes(state: &ArmState, hold: &Hold) -> Vec<(&'static str, ArmState)> {
         ("wanted", changed(&|s| s.wanted = Wanted::Joints(0.25))),
         ("commanded", changed(&|s| s.commanded.0[2] += 1e-9)),
         ("held_back", changed(&|s| s.held_back ^= true)),
-        ("guard", changed(&|s| s.guard.end_frame([DVec3::X, DVec3::ZERO], Default::default(), DVec3::Y, 10.0))),
+        ("guard", changed(&|s| s.guard.end_frame([DVec4::X, DVec4::ZERO], Default::default(), [DVec4::Y; 2], 10.0))),
         ("guarded", changed(&|s| s.guarded ^= true)),
-        ("solid", changed(&|s| s.solid.add(1e-9 * DVec3::X))),
+        ("solid", changed(&|s| s.solid.add(Wrench { force: 1e-9 * DVec3::X, torque: DVec3::ZERO }))),
         ("pressed", changed(&|s| s.pressed.end_frame(8, [force_on_shaft(1e-9)].into_iter()))),
         ("gripper", changed(&|s| s.gripper.pose.translation.x += 1e-9)),
         ("jaw angle", changed(&|s| s.gripper.jaw_angle += 1e-9)),
