@@ -1,21 +1,21 @@
 //! Our stepping beside public solvers, on one mesh, in one run, on one machine: Newton's VBD (8
 //! substeps of 10 iterations) and MuJoCo's flex (one step of 1/60 s a frame).
 //!
-//! The peers' scripts and meshes stand beside the repository (`../shared/peers`) and are copied;
-//! the peers come from PyPI into an environment of their own. Runs alternate, so that a busy
-//! machine slows all of them; every figure is the median over the rounds.
+//! The peers' scripts and meshes are beside the repository (`../shared/peers`) and are copied. The
+//! peers come from PyPI into an environment of their own. Runs alternate, because a busy machine
+//! must slow all of them. Every figure is the median over the rounds.
 //!
 //! MuJoCo's script and ours time as many frames. The peers' scripts know one motion, the organs
 //! sagging from rest under gravity; ours is timed on the same sag, and on a drag of the appendix,
 //! which is harder. The table says what each did. MuJoCo is timed without and with a pool of two
-//! threads, and the faster counts. Newton's kernels on a CPU run on one thread whatever is set, so
+//! threads, and the faster counts. Newton's kernels on a CPU run on one thread with any setting, so
 //! that is its best.
 
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// What the peers need.
+/// The packages that the peers need.
 const PACKAGES: [&str; 5] = ["newton==1.8.0", "warp-lang==1.19.0", "mujoco==4.0.0", "meshio", "scipy"];
 /// Where their scripts and meshes are, beside the repository.
 const SCRIPTS: &str = "../shared/peers";
@@ -34,7 +34,7 @@ struct Solver {
     name: &'static str,
     /// Its threads, for people.
     threads: &'static str,
-    /// What is timed, for people.
+    /// Description of the timed work, for people.
     work: &'static str,
     run: fn(&Places) -> Outcome<Figures>,
 }
@@ -70,7 +70,7 @@ const SOLVERS: [Solver; 11] = [
     Solver { name: "trocar, fast schedule", threads: "2", work: DRAG, run: |p| ours(p, "fast", "2") },
 ];
 
-/// What ours does: the frames that `bench organs` times unless told otherwise.
+/// The work of our runs: the frames that `bench organs` times by default.
 const DRAG: &str = "120 frames of drag";
 
 /// What MuJoCo does, and ours beside it: the organs sag from rest under gravity.

@@ -1,6 +1,6 @@
-//! What some tests compare with and is not part of the project: ONNX Runtime's library, MuJoCo,
-//! OpenCV, Embree, scikit-image, openpi's client and server, the TetGen program. Without them these
-//! tests are skipped, and say so.
+//! External tools and libraries that some tests compare with, and that are not part of the project:
+//! ONNX Runtime's library, MuJoCo, OpenCV, Embree, scikit-image, openpi's client and server, the
+//! TetGen program. Without them these tests are skipped, and say so.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -10,7 +10,7 @@ struct Environment {
     folder: &'static str,
     /// Packages and their versions.
     packages: &'static [&'static str],
-    /// What must be importable then.
+    /// The Python modules that must be importable then.
     modules: &'static str,
 }
 

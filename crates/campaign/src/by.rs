@@ -1,4 +1,5 @@
-//! What success is shown by: the names that `--by` takes, checked against what varies.
+//! The factors and groups by which success is shown: the names that `--by` takes, checked against
+//! the variation.
 
 use crate::store::EpisodeRecord;
 use trocar_scene::{Distribution, DrawnValue, Factor, Scene, Split};
@@ -10,7 +11,7 @@ const SPLIT: &str = "split";
 const SPECIMEN: &str = "specimen";
 /// The name of all that varies.
 const ALL: &str = "all";
-/// What the name of the specimen that an organ is of begins with.
+/// Prefix of the name of an organ's specimen.
 const SWAPPED: &str = "swapped.";
 
 /// Groups: a name for one or more of the others.
@@ -87,8 +88,8 @@ impl By {
         all
     }
 
-    /// What `names` ask for: each is a factor, a group, a drawn number, `specimen`, `split` or
-    /// `all`. No name means all that varies.
+    /// The rows that `names` select: each name is a factor, a group, a drawn number, `specimen`,
+    /// `split` or `all`. No name selects everything that varies.
     ///
     /// # Errors
     /// A name that is unknown, or of something that does not vary.
@@ -167,7 +168,7 @@ impl By {
         }
     }
 
-    /// What is on the axis of a plot, with the unit.
+    /// The axis label of a plot, with the unit.
     pub fn label(&self, single: bool) -> String {
         let (Source::Factor(factor) | Source::Number(factor)) = self.source else { return self.name.clone() };
         let (words, unit) = words(factor.name());

@@ -71,7 +71,7 @@ pub struct Campaign {
     /// The set of factors that vary between episodes, instead of the scene's. Without one, a scene
     /// that has no set varies by [`DEFAULT_VARIATION`].
     pub variation: Option<VariationSet>,
-    /// What success is shown by: factors, groups, drawn numbers; all that varies if empty.
+    /// By what success is shown: factors, groups, drawn numbers; everything that varies if empty.
     pub by: Vec<String>,
     /// Number of parallel episodes; 0 for one per core. Results do not depend on it.
     pub jobs: usize,
@@ -246,7 +246,7 @@ impl Store {
     pub fn write_results(&self, manifest: &Manifest, by: &[By]) -> Result<CampaignResult> {
         let records = self.records(manifest)?;
         let result = CampaignResult::of(manifest, by, &records, self.folder());
-        // All three are made before the first is written, so that they show the same episodes.
+        // All three are made before the first is written: they must show the same episodes.
         let csv = csv_table(&records)?;
         let page = page::campaign(manifest, &result, &records, self)
             .map_err(|why| self.unreadable_channels(&records).unwrap_or(why))?;

@@ -49,7 +49,7 @@ fn why(k: &EpisodeRecord) -> String {
     s.why.clone().or_else(|| s.end.as_ref().map(ToString::to_string)).unwrap_or_default()
 }
 
-/// What was drawn for an episode: names with their values.
+/// The drawn values of an episode: names with their values.
 fn drawn(k: &EpisodeRecord) -> Vec<(String, String)> {
     let Some(drawn) = &k.summary.drawn else { return Vec::new() };
     drawn.words().into_iter().chain(drawn.values.iter().map(|v| (v.name(), v.value.to_string()))).collect()

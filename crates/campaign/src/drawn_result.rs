@@ -1,4 +1,4 @@
-//! What varied in a campaign, and what was drawn for its episodes.
+//! The variation of a campaign, and the drawn values of its episodes.
 
 use crate::manifest::Manifest;
 use crate::store::EpisodeRecord;
@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use trocar_scene::{Distribution, Drawn, Split, Variation};
 
-/// What was drawn for the episodes of a seed, by all policies.
+/// The drawn values of the episodes of a seed, by all policies.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DrawnEpisode {
     /// The seed.
@@ -15,7 +15,7 @@ pub struct DrawnEpisode {
     pub drawn: Drawn,
 }
 
-/// What varied between the episodes of a campaign.
+/// The variation between the episodes of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VariationResult {
     /// The name of the set.
@@ -24,7 +24,7 @@ pub struct VariationResult {
     pub table: Variation,
     /// Which episodes they are.
     pub split: Split,
-    /// What was drawn, by seed.
+    /// The drawn values, by seed.
     pub episodes: Vec<DrawnEpisode>,
 }
 

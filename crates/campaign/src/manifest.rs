@@ -27,7 +27,7 @@ pub(super) fn program() -> String {
     format!("{} {}", env!("CARGO_PKG_VERSION"), trocar_workflow::EPISODE_SOURCE_HASH)
 }
 
-/// The specimen by whose hash a campaign of `scene` is known: the first one that episodes of
+/// The specimen by whose hash a campaign of `scene` is identified: the first one that episodes of
 /// `split` draw from. Each episode file knows its own.
 pub fn named_specimen(scene: &Scene, split: Split) -> SpecimenSource {
     split.of_specimens(&scene.specimens()).first().unwrap_or(&scene.specimen).clone()
@@ -113,7 +113,7 @@ pub struct Manifest {
     pub split: Split,
     /// Number of the first episode in its split. Of seen episodes it is the seed.
     pub seed: u64,
-    /// What varies between episodes.
+    /// The variation between episodes.
     #[serde(default)]
     pub variation: Variation,
     /// Control period of the scene (s).
@@ -179,7 +179,7 @@ impl Manifest {
         (0..self.episodes as u64).map(move |index| self.split.seed(first + index))
     }
 
-    /// All jobs. Policies take turns, so that an interrupted campaign can still compare them.
+    /// All jobs. Policies take turns: an interrupted campaign can still compare them.
     pub fn jobs(&self) -> impl Iterator<Item = Job> + '_ {
         let all = self.seeds().enumerate().flat_map(move |(index, seed)| {
             self.policies.iter().map(move |policy| Job { policy: policy.clone(), index, seed })

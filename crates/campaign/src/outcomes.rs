@@ -41,7 +41,8 @@ impl<'a> Outcome<'a> {
     /// Whether no figure differs by more than can be measured. `period` is the control period (s).
     fn equals(&self, other: &Self, period: f64) -> bool {
         let near = |a: &[Option<f64>], b: &[Option<f64>], most: f64| {
-            // Times are whole periods, so rounding must not tell one apart from another.
+            // Times are whole periods. Rounding must not make a difference of one period look
+            // larger.
             let near = |(a, b): (&Option<f64>, &Option<f64>)| match (a, b) {
                 (Some(a), Some(b)) => (a - b).abs() <= most * (1.0 + 1e-9),
                 (a, b) => a.is_none() == b.is_none(),

@@ -132,7 +132,7 @@ pub fn success_over(policies: &[&str], curve: &Curve) -> Result<String> {
     let mut lines = Vec::new();
     for k in 0..count {
         let color = colors::organ(k);
-        // Policies stand beside each other, so that their whiskers can be told apart.
+        // Policies are drawn side by side: their whiskers must not overlap.
         let aside = BESIDE * width * (k as f64 - 0.5 * (count as f64 - 1.0));
         let shares = curve.bins.iter().filter_map(|bin| Some((bin.numbers?[1], bin.policies.get(k)?)));
         let points: Vec<(f64, &Interval)> = shares

@@ -38,7 +38,7 @@ pub(crate) struct PolicyServer {
 
 impl Drop for PolicyServer {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // It may have exited already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -104,8 +104,8 @@ impl PolicyServer {
     /// Starts the server of a Python policy and waits for its address.
     pub fn start(python: &str, module: &str, stop: &AtomicBool) -> std::result::Result<Self, String> {
         let mut command = Command::new(python);
-        // A terminal's Ctrl-C must reach only this process, which then ends the child. A child that
-        // ended by itself would look like a policy that fails.
+        // A terminal's Ctrl-C must reach only this process, which then ends the child. Otherwise a
+        // child that ended first would look like a policy that fails.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command
@@ -131,7 +131,7 @@ impl PolicyServer {
         each_line(out, move |line| {
             // A policy may print other lines first.
             if line.starts_with("ws://") {
-                // The receiver is gone after the first address.
+                // The receiver no longer exists after the first address.
                 let _ = sender.send(line);
             }
         });

@@ -75,7 +75,7 @@ impl EpisodeRecord {
         arms.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, lag)| lag)
     }
 
-    /// Why it did not pass, in words; how it ended where nothing says why.
+    /// Why it did not pass, in words; its end if there is no reason.
     pub(crate) fn why(&self) -> String {
         let end = || self.summary.end.as_ref().map_or("no end".to_owned(), ToString::to_string);
         self.summary.why.clone().unwrap_or_else(end)
@@ -90,7 +90,7 @@ impl EpisodeRecord {
 /// A campaign's folder.
 pub struct Store {
     folder: PathBuf,
-    /// Held as long as the store lives, so that only one process writes.
+    /// Held as long as the store lives: only one process writes.
     _lock: fs::File,
 }
 
@@ -142,7 +142,7 @@ pub(super) fn check_compatible(
 ) -> Result<()> {
     let Some(old) = read_manifest(folder)? else { return Ok(()) };
     let exists = |reason: String| Err(Error::Exists { path: folder.to_owned(), reason });
-    // Files of earlier programs lack what is compared next.
+    // Files of earlier programs lack the fields that are compared next.
     let other = [
         ("program", old.program != manifest::program()),
         ("seed", old.seed != seed),
@@ -255,8 +255,8 @@ impl Store {
         if let Some(parent) = target.parent() {
             fs::create_dir_all(parent).map_err(io(parent))?;
         }
-        // An older episode is renamed whole, so that no part of it is ever visible. Names of
-        // policies may have dots, so `with_extension` would not do.
+        // An older episode is renamed as a whole: no part of it is ever visible. Names of policies
+        // may have dots, so `with_extension` would not do.
         let aside = self.folder.join(IN_PROGRESS).join(format!("{}-{:06}.old", job.policy.name, job.index));
         if target.exists() {
             fs::rename(&target, &aside).map_err(io(&target))?;

@@ -40,10 +40,10 @@ pub struct EndCounts {
     pub diverged: usize,
     /// The policy failed.
     pub policy_error: usize,
-    /// What the task names as an abort came to be.
+    /// An abort condition of the task held.
     #[serde(skip_serializing_if = "is_zero")]
     pub aborted: usize,
-    /// The policy had nothing left to do before all stages passed.
+    /// The policy finished before all stages passed.
     pub finished: usize,
 }
 
@@ -164,9 +164,9 @@ pub struct CampaignResult {
     /// How often a rule switched physics off: never, since none does. Results of earlier programs
     /// have other numbers here.
     pub suspensions: usize,
-    /// What varied, and what was drawn.
+    /// The variation, and the drawn values.
     pub variation: VariationResult,
-    /// Success over what varied.
+    /// Success by factor.
     pub by: Vec<Curve>,
     /// The policies in order.
     pub policies: Vec<PolicyRow>,

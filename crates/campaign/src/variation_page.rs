@@ -17,7 +17,7 @@ use trocar_workflow::{Result, counted};
 /// Maximum number of episodes in the table.
 const MAX_LISTED: usize = 400;
 
-/// What varied and by how much.
+/// The varied factors and their ranges.
 pub(super) fn varied(manifest: &Manifest, r: &CampaignResult, records: &[EpisodeRecord]) -> String {
     let factors = manifest.variation.all_factors();
     let drawn: Vec<_> = records.iter().filter_map(|k| k.summary.drawn.as_ref()).collect();
@@ -118,7 +118,7 @@ fn by_value(curve: &Curve) -> String {
     Table::new(head, curve.bins.iter().map(row).collect()).html()
 }
 
-/// Every episode with what was drawn for it, folded.
+/// Every episode with its drawn values, folded.
 pub(super) fn episodes(records: &[EpisodeRecord]) -> String {
     let names: Vec<String> = records
         .iter()

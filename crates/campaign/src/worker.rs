@@ -66,7 +66,7 @@ impl Worker {
         self
     }
 
-    /// Makes `policies`, so that one that cannot act is reported before the first episode.
+    /// Makes `policies` now, in order to report one that cannot act before the first episode.
     ///
     /// # Errors
     /// A Python policy that cannot be loaded; [`Error::Interrupted`] if the stop flag is set.

@@ -2,20 +2,20 @@
 //!
 //! At a station x along the blades the edges are 2 x tan(theta / 2) apart. Where they are as far
 //! apart as the tissue there is thick, they meet it, and the cut passes that station while they
-//! close by a share of its thickness ([`SINK`]). What is cut opens an area, and each area takes the
-//! toughness J. So the torque that closes the blades is J dA/dtheta, which for a sheet of thickness
-//! t is J t^2 / (4 sin^2(theta / 2)) but for the cosine of the half angle, as in Mahvash and
-//! Okamura (2005; 2008, IEEE Trans. Biomed. Eng. 55:848). It depends on toughness and geometry, not
-//! on stiffness. Tissue that is thicker than the edges are apart is cut where they pass, with the
-//! force J for each length of edge.
+//! close by a share of its thickness ([`SINK`]). A cut opens an area, and each unit of area takes
+//! the toughness J. So the torque that closes the blades is J dA/dtheta, which for a sheet of
+//! thickness t is J t^2 / (4 sin^2(theta / 2)) but for the cosine of the half angle, as in Mahvash
+//! and Okamura (2005; 2008, IEEE Trans. Biomed. Eng. 55:848). It depends on toughness and geometry,
+//! not on stiffness. Tissue that is thicker than the edges are apart is cut where they pass, with
+//! the force J for each length of edge.
 //!
-//! Torque is limited by what the jaws have. Where the tissue needs more, the blades stand.
+//! Torque is limited by what the jaws have. If the tissue needs more torque, the blades stop.
 
 use crate::section::{Chord, STATION, place};
 
 /// Share of the thickness by which the edges sink into tissue until they are through. It spreads
-/// the cut over a short way: without it, edges that meet a round organ along a line would need an
-/// infinite force. The force on a sheet is by half of it smaller.
+/// the cut over a short distance: without it, edges that meet a round organ along a line would need
+/// an infinite force. The force on a sheet is smaller by half of this share.
 pub(crate) const SINK: f64 = 0.15;
 
 /// The blades turn in steps of this angle (rad).
@@ -50,11 +50,11 @@ pub(crate) struct Bite {
     pub organ: usize,
     /// Angle of the open blades (rad).
     pub opened: f64,
-    /// Area that was told of in an event (m2).
+    /// Area that events have already reported (m2).
     pub told: f64,
     /// Force that tissue exerts on the blades, at their middle (N).
     pub force: f64,
-    /// The largest so far.
+    /// Largest such force so far.
     pub force_peak: f64,
     /// Work of the jaws so far (J).
     pub work: f64,
@@ -77,8 +77,8 @@ impl Bite {
         Self { organ, opened, told, force, force_peak, work, toughness, lever, stations, slit }
     }
 
-    /// Takes over where the tissue is now, with the blades at `angle` (rad). What is partly cut
-    /// stays as it was measured before.
+    /// Updates the stations to the tissue's present place, with the blades at `angle` (rad). A
+    /// station that is partly cut keeps its earlier measurement.
     pub fn measure(&mut self, chords: &[Chord], angle: f64) {
         for (k, (station, chord)) in self.stations.iter_mut().zip(chords).enumerate() {
             if station.share > 0.0 {
@@ -115,7 +115,7 @@ impl Bite {
         angle
     }
 
-    /// Area that would be cut on the way to `angle` (m2).
+    /// Further area that is cut when the blades close to `angle` (m2).
     fn area_by(&self, angle: f64) -> f64 {
         let of = |(k, s): (usize, &Station)| s.thickness * (s.share_at(gap(k, angle)) - s.share);
         STATION * self.stations.iter().enumerate().map(of).sum::<f64>()
@@ -126,7 +126,7 @@ impl Bite {
         STATION * self.stations.iter().map(|s| s.thickness * s.share).sum::<f64>()
     }
 
-    /// Whether next to nothing is left between the blades.
+    /// Whether almost nothing is left between the blades.
     pub fn is_through(&self) -> bool {
         self.area() > 0.0 && self.area() >= (1.0 - LEFT) * self.area_between()
     }
@@ -136,7 +136,7 @@ impl Bite {
         self.area() - self.told > LEFT * self.area_between()
     }
 
-    /// Area of the tissue between the blades when they came to it (m2).
+    /// Area of the tissue that was between the blades when they reached it (m2).
     fn area_between(&self) -> f64 {
         STATION * self.stations.iter().map(|s| s.thickness).sum::<f64>()
     }

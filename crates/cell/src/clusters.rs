@@ -10,8 +10,8 @@ use trocar_tissue::Body;
 /// Length of a cluster along the axis (m).
 const CLUSTER_LENGTH: f64 = 0.010;
 
-/// A cluster is at least this many median edges long, so that every cluster of a coarsely meshed
-/// large organ has nodes.
+/// A cluster is at least this many median edges long. So every cluster of a coarsely meshed large
+/// organ has nodes.
 const CLUSTER_EDGES: f64 = 1.5;
 
 /// Nodes nearer to pinned tissue than this (m), or than this many median edges, are in no cluster

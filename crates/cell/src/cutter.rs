@@ -1,7 +1,7 @@
-//! Scissors: when closing blades cut, and what they cut.
+//! Scissors: when closing blades cut, and which tissue they cut.
 //!
 //! A cutter's blades move like the gripper's. The cut lies in the plane between the blades, over
-//! their length and as wide as they were open; it opens as far as the edges have come. A tube
+//! their length and as wide as they were open. It opens as far as the edges have come. A tube
 //! across the blades is cut through if its whole cross-section is between them, else in part. The
 //! cutting edges have no width: they push no tissue.
 
@@ -55,8 +55,8 @@ impl Scissors {
         self.opened = None;
     }
 
-    /// Takes over where the cutter is now. If its open blades have just closed, returns the gripper
-    /// there with the blades as wide as they were: the tissue between them is cut
+    /// Follows the cutter to its present place. If its open blades have just closed, returns the
+    /// gripper there with the blades as wide as they were: the tissue between them is cut
     /// ([`Gripper::cut`]). `None` otherwise; blades that close again without opening cut nothing.
     pub fn follow(&mut self, gripper: &Gripper) -> Option<Gripper> {
         let angle = gripper.jaw_angle;

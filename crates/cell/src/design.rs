@@ -22,8 +22,7 @@ pub enum GraspDesign {
 }
 
 /// Stiffness of a compliant grasp's spring over Young's modulus times the median edge, about the
-/// stiffness of the tissue around a node. It is far above one, so that held tissue follows the
-/// jaws.
+/// stiffness of the tissue around a node. It is far above one: held tissue follows the jaws.
 const SPRING: f64 = 20.0;
 
 /// Forces of a compliant grasp.

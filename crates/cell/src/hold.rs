@@ -5,7 +5,7 @@ use glam::DVec3;
 use trocar_core::Pose;
 use trocar_tissue::Piece;
 
-/// The tissue that was in the jaws when they closed, and where it was.
+/// The tissue that was in the jaws when they closed, and its place then.
 #[derive(Clone, Debug)]
 pub(crate) struct Hold {
     organ: usize,

@@ -15,8 +15,8 @@ use crate::gripper::MAX_ANGLE;
 /// `docs/measurements/grasp.md`.
 pub const JAW_FORCE: f64 = 0.5;
 
-/// Largest force with which jaws open against tissue, the bed and pinned tissue (N), if they have
-/// it.
+/// Largest force with which jaws open against tissue, the bed and pinned tissue (N), if the drive
+/// has that much.
 const OPENING_FORCE: f64 = 1.0;
 
 /// Time from wide open to closed, without tissue (s).
@@ -25,11 +25,11 @@ const CLOSING_TIME: f64 = 0.3;
 /// Share of the way to the budget that one step goes.
 const GAIN: f64 = 0.5;
 
-/// Within this share of the budget the jaw stands still, so that held tissue comes to rest.
+/// Within this share of the budget the jaw stands still, and held tissue comes to rest.
 const DEADBAND: f64 = 0.02;
 
-/// Decay of the stiffest secant from one frame to the next, so that the jaw stays slow for a while
-/// after it met stiff tissue.
+/// Decay of the stiffest secant from one frame to the next: the jaw stays slow for a while after it
+/// met stiff tissue.
 const FORGETTING: f64 = 0.8;
 
 /// Minimum motion for a secant (rad); below it, creep would be mistaken for stiffness.
@@ -44,7 +44,7 @@ pub struct Jaw {
     max_angle: f64,
     /// Fastest motion (rad a frame).
     fastest: f64,
-    /// The direction in which it pressed last: -1 closed it, 1 opened it.
+    /// Direction of the last press: -1 closed the jaw, 1 opened it.
     direction: f64,
     /// Stiffness seen so far in that direction: opening force per closing angle (N/rad).
     stiffness: f64,
@@ -117,7 +117,7 @@ impl Jaw {
         [budget, direction, stiffness, angle, force].into_iter()
     }
 
-    /// Forgets what it met.
+    /// Forgets the contact.
     pub fn rest(&mut self) {
         (self.direction, self.stiffness, self.last) = (-1.0, 0.0, None);
     }

@@ -1,4 +1,5 @@
-//! The tissue of an organ's elements: softer than the organ's by what the mesh is too stiff.
+//! The tissue of an organ's elements: softer than the organ, to compensate for a mesh that is too
+//! stiff.
 //!
 //! Linear tetrahedra bend as a stiffer body does, the more the fewer of them lie over its
 //! thickness, and lock where they must keep their volume. Both are errors of the mesh, which no

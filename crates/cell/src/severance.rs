@@ -96,7 +96,7 @@ pub(crate) struct Parting {
     pub pieces: Vec<Piece>,
     /// The figures when it parted last.
     pub figures: Severance,
-    /// Number of faces that events told of.
+    /// Number of faces that the last event reported.
     pub told: Option<usize>,
     /// Number of cuts of the world when it parted last.
     cuts: usize,

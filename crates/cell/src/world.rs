@@ -17,7 +17,7 @@ pub const FRAME: f64 = 1.0 / 60.0;
 /// Standard gravity (m/s2).
 pub(crate) const GRAVITY: f64 = 9.80665;
 
-/// Friction between tissue and what it lies on (paper section IV-C).
+/// Friction between tissue and its support (paper section IV-C).
 const SUPPORT_FRICTION: f64 = 0.6;
 
 /// Shear viscosity of tissue over its Young's modulus (s). Sheared tissue creeps with three times
@@ -46,14 +46,14 @@ pub struct World {
     pub(crate) cuts: usize,
 }
 
-/// What organs lie on and how they touch each other.
+/// The surroundings of organs: their supports, and how they touch each other.
 #[derive(Clone, Debug)]
 pub struct Surroundings {
-    /// What bears the tissue.
+    /// The solver backend of the tissue.
     pub backend: Backend,
     /// How organs touch each other; None if they pass through each other.
     pub body_contact: Option<BodyContact>,
-    /// What of organs touches instruments.
+    /// The parts of organs that touch instruments.
     pub tool_contact: ToolContact,
     /// Pairs of organs without contact, by their indices in the specimen.
     pub filtered: Vec<[usize; 2]>,
@@ -61,7 +61,8 @@ pub struct Surroundings {
     pub bed_friction: Option<f64>,
     /// Organs without a bed, by their indices.
     pub floating: Vec<usize>,
-    /// Whether tetrahedra are softer than their organ by what its mesh is too stiff.
+    /// Whether tetrahedra are made softer than their organ, to compensate for a mesh that is too
+    /// stiff.
     pub mesh_correction: bool,
     /// Toughness of organs (J/m2), by their indices; [`TOUGHNESS`] of those that are left out.
     pub toughness: Vec<f64>,

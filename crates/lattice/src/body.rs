@@ -55,7 +55,7 @@ pub struct PointLoad {
     pub force: DVec3,
 }
 
-/// What acts on a body from outside.
+/// The loads on a body from outside.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Conditions<'a> {
     /// Gravitational acceleration (m/s2).
@@ -176,7 +176,7 @@ fn belongs(point: &EmbeddedPoint, lattice: &Lattice) -> bool {
     hex.is_some_and(|hex| hex.nodes == point.nodes) && point.weights.iter().all(|w| w.is_finite())
 }
 
-/// What moves of a body: plain data that can be copied, compared and restored exactly.
+/// The changing part of a body: plain data that can be copied, compared and restored exactly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyState {
     /// Positions of the nodes (m).

@@ -1,4 +1,4 @@
-//! What can go wrong: input that cannot be used, and minima that are not found.
+//! Errors: input that cannot be used, and minima that are not found.
 
 /// Result of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -14,7 +14,7 @@ pub enum Error {
     Body {
         /// Its name.
         body: String,
-        /// What is wrong and what would be right.
+        /// The reason and the remedy.
         reason: String,
     },
     /// Conditions, settings or a state that do not fit.

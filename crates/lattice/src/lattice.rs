@@ -100,8 +100,8 @@ impl Lattice {
     }
 
     /// A lattice around a watertight surface. Its inside is first filled with tetrahedra of half a
-    /// cell's edge ([`LatticeMesher`]), which round off smaller features. [`Self::volume`] tells
-    /// how much of the volume is kept.
+    /// cell's edge ([`LatticeMesher`]), which round off smaller features. [`Self::volume`] is the
+    /// volume that is kept.
     ///
     /// # Errors
     /// As [`Self::of_mesh`], and for a surface that is not watertight, faces inward, or is too thin

@@ -1,5 +1,5 @@
-//! Parts of campaigns, so that Python can distribute their jobs over machines: the manifest with
-//! its store, and workers.
+//! Parts of campaigns for Python, which distributes their jobs over machines: the manifest with its
+//! store, and workers.
 //!
 //! Jobs and results are JSON text and bytes, which any transport carries. Manifest, store, table
 //! and report are those of `trocar evaluate`.

@@ -14,14 +14,15 @@ use trocar_cell::{Action, ActionSpace};
 use trocar_task::{Bounds, Channels, End, Episode, EpisodeState, STATE_NAMES, STATE_SIZE};
 use trocar_workflow::{SpecimenCache, drawn_specimens};
 
-/// Numbers a cell and step in `figures`: reward, score, stages passed, how it ended (-1 while it
-/// goes on), time (s).
+/// Numbers per cell and step in `figures`: reward, score, stages passed, end (-1 while the episode
+/// runs), time (s).
 const FIGURES: [&str; 5] = ["reward", "score", "stage", "end", "time_s"];
 
 /// Names of the ends, by their number in `figures`.
 const ENDS: [&str; 7] = ["passed", "time-out", "rcm-abort", "diverged", "policy-error", "finished", "aborted"];
 
-/// A saved episode. It stays in the process: nothing loaded from disk is trusted with so much.
+/// A saved episode. It stays in the process, because nothing that is loaded from disk would be
+/// trusted like this.
 #[pyclass(frozen, module = "trocar._native")]
 pub struct State(EpisodeState);
 
@@ -37,8 +38,8 @@ pub struct Cells {
     task_name: String,
     prompt: String,
     steps: usize,
-    /// The process that made them. The pool's threads do not live on in a child made by `fork`, and
-    /// work given to them there would wait for ever.
+    /// The process that made them. The pool's threads do not exist in a child made by `fork`. Work
+    /// given to them there would never finish.
     process: u32,
 }
 
@@ -79,8 +80,8 @@ impl Place<'_> {
         }
     }
 
-    /// The reward is the gain in stages, parts of stages included: a task passed gives as much as
-    /// it has stages in all.
+    /// The reward is the gain in stages, including parts of stages: a passed task gives its number
+    /// of stages in all.
     fn step(&mut self, action: &Action) -> Result<(), trocar_task::Error> {
         if self.episode.end().is_some() {
             return Err(trocar_task::Error::Ended(self.episode.end().map_or_else(String::new, End::to_string)));
@@ -128,7 +129,7 @@ impl Cells {
         py.detach(|| {
             let specimens = prepare::specimens(&scene, split, &phantoms)?;
             let pool = trocar_core::thread_pool(threads).map_err(wrong)?;
-            // One cell uses all threads; of many, each has its own.
+            // One cell uses all threads. With several cells, each uses one.
             let each = if count == 1 { threads } else { 1 };
             let seed = split.seed(0);
             let begun = || Episode::begun(&scene, Box::new(specimens.clone()), each, seed, scene.draw(seed));
@@ -155,7 +156,7 @@ impl Cells {
         &self.task_name
     }
 
-    /// What the task asks for, in words.
+    /// The task's instruction, in words.
     #[getter]
     fn prompt(&self) -> &str {
         &self.prompt
@@ -303,17 +304,17 @@ impl Cells {
         self.viewers.see(py, &self.episodes, |k| told[k].as_ref().map(|_| false))
     }
 
-    /// Why the episode in cell `k` ended; None while it goes on.
+    /// Why the episode in cell `k` ended; None while it runs.
     fn why(&self, k: usize) -> PyResult<Option<String>> {
         Ok(self.at(k)?.end().map(End::to_string))
     }
 
-    /// What happened in cell `k` since its reset: a JSON list of `[time_s, event]`.
+    /// The events in cell `k` since its reset: a JSON list of `[time_s, event]`.
     fn events(&self, k: usize) -> PyResult<String> {
         serde_json::to_string(self.at(k)?.events()).map_err(wrong)
     }
 
-    /// What was drawn for the episode in cell `k`: a JSON object.
+    /// The drawn values of the episode in cell `k`: a JSON object.
     fn drawn(&self, k: usize) -> PyResult<String> {
         serde_json::to_string(self.at(k)?.drawn()).map_err(wrong)
     }
@@ -360,7 +361,7 @@ fn built(
         let more: trocar_task::Result<Vec<Episode>> =
             pool.install(|| (0..batch).into_par_iter().map(|_| one()).collect());
         episodes.extend(more.map_err(|e| task(&e))?);
-        // Signals are told to the thread that called, not to those of the pool.
+        // Only the calling thread receives signals, not those of the pool.
         Python::attach(|py| py.check_signals())?;
     }
     Ok(episodes)
@@ -378,8 +379,8 @@ impl Cells {
         self.episodes.get(k).ok_or_else(|| wrong(format!("cell {k} is not there; there are {count}")))
     }
 
-    /// Does `work` in every cell, with what `with` has for it, in parallel and without the
-    /// interpreter's lock. The first error in the order of the cells is told.
+    /// Runs `work` in every cell, with that cell's item of `with`, in parallel and without the
+    /// interpreter's lock. It reports the first error in the order of the cells.
     fn each<T: Sync>(
         &mut self,
         py: Python<'_>,

@@ -3,7 +3,7 @@
 use pyo3::PyErr;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
 
-/// What cannot be: a scene, a name, an action, an array.
+/// An invalid input: a scene, a name, an action, an array.
 pub fn wrong(why: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(why.to_string())
 }

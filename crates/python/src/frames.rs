@@ -1,4 +1,4 @@
-//! Arrays that the caller owns, cut into one piece a cell, so that cells can be written at once.
+//! Arrays that the caller owns, cut into one piece per cell: all cells can be written at once.
 
 use crate::error::wrong;
 use numpy::{Element, PyArrayDyn, PyArrayMethods, PyReadwriteArray, PyUntypedArrayMethods, ndarray::IxDyn};

@@ -1,5 +1,5 @@
-//! What the cameras see of the cells: colour and depth written into the caller's arrays, all cells
-//! at once.
+//! Pictures of the cells through their cameras: colour and depth of all cells at once, written into
+//! the caller's arrays.
 
 use crate::error::wrong;
 use crate::frames::Rows;
@@ -49,7 +49,7 @@ fn sensor_noise(episode: &Episode, noise: bool) -> CameraNoise {
     CameraNoise { color: Some(COLOR_NOISE), depth: Some(DepthNoise::default()), seed }
 }
 
-/// A camera as Python is told of it: name, height and width (px) of what policies see, whether it
+/// A camera as Python sees it: name, height and width (px) of policies' pictures, and whether it
 /// measures depth.
 pub type Described = (String, usize, usize, bool);
 

@@ -9,7 +9,7 @@ use std::sync::{Mutex, MutexGuard};
 use trocar_cell::{Action, ActionSpace};
 use trocar_task::policy::{POLICIES, named};
 
-/// A controller and what is left of its chunk.
+/// A controller and the rest of its chunk.
 struct Inner {
     policy: Box<dyn trocar_task::Policy + Send>,
     chunk: VecDeque<Action>,

@@ -76,7 +76,7 @@ pub fn missing_specimens(scene: &str, variation: Option<&str>, split: &str, phan
 }
 
 /// The specimens of the episodes of `scene` in `split`. They are made now in the folder `phantoms`,
-/// so that no episode waits for one.
+/// before the first episode needs one.
 pub fn specimens(scene: &Scene, split: Split, phantoms: &Path) -> PyResult<SpecimenCache> {
     let specimens = SpecimenCache::new(scene, phantoms);
     let all = scene.specimens();

@@ -9,7 +9,7 @@ use trocar_core::Progress;
 /// How often signals are looked at.
 const EVERY: Duration = Duration::from_millis(200);
 
-/// Says nothing, and stops when the user does.
+/// Reports nothing, and stops when the user does.
 pub struct Signals {
     looked: Mutex<Instant>,
     stopped: AtomicBool,

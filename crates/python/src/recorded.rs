@@ -33,7 +33,7 @@ impl Recorded {
         Ok(Self(if plain_light { made.in_plain_light() } else { made }))
     }
 
-    /// What is known of the recording: a JSON object.
+    /// The header of the recording: a JSON object.
     #[getter]
     fn header(&self) -> PyResult<String> {
         let episode = &self.0.file.header;
@@ -74,7 +74,7 @@ impl Recorded {
         self.0.now().score
     }
 
-    /// What a policy observes.
+    /// The observation of a policy.
     #[getter]
     fn state<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
         PyArray1::from_slice(py, &self.0.now().state)
@@ -88,7 +88,7 @@ impl Recorded {
         height: usize,
         width: usize,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        // What policies see, too.
+        // These are the pictures of policies, too.
         let settings = RenderSettings::Preview { shadows: false };
         let pixels = py.detach(|| {
             let picture = self.0.picture(camera, [width, height], &settings)?;

@@ -60,7 +60,7 @@ impl Viewers {
 
 impl Drop for Viewers {
     fn drop(&mut self) {
-        // The cells are gone: there is nothing more to show.
+        // The cells no longer exist: there is nothing to show.
         self.0.iter().for_each(|(_, viewer)| drop(taken(viewer)));
     }
 }

@@ -26,7 +26,7 @@ pub struct Settings {
     /// The mesher that fills it with tetrahedra.
     pub mesher: MesherRule,
     /// Edge of the elements at the surface (m), and of the triangles that TetGen gets. By default
-    /// `finest_cell`, or larger so that there are no more than `max_tets`.
+    /// `finest_cell`, or larger in order to have no more than `max_tets` elements.
     pub element_size: Option<f64>,
     /// Edge of the finest lattice cell where `element_size` is not set (m).
     pub finest_cell: f64,

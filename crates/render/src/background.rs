@@ -1,4 +1,4 @@
-//! What previews through one camera have in common: bodies at rest, and their light.
+//! The common parts of previews through one camera: bodies at rest, and their light.
 //!
 //! The cameras of a cell do not move, and most of what they see does not move either. Bodies that
 //! have rested for a while are drawn and lit once for a camera. Later pictures start with them.
@@ -27,7 +27,7 @@ pub(crate) struct Memory {
     cameras: Vec<Background>,
 }
 
-/// What is kept of pictures through a camera.
+/// The background of pictures through one camera.
 #[derive(Debug)]
 pub(crate) struct Background {
     lens: (CameraModel, Option<f32>),
@@ -36,7 +36,7 @@ pub(crate) struct Background {
     bodies: Vec<Rest>,
     /// Bodies that are drawn.
     visibility: Option<Visibility>,
-    /// What the last picture was lit with.
+    /// The light of the last picture.
     look: Option<Look>,
     /// Light of the drawn bodies with that look.
     picture: Option<Picture>,
@@ -61,7 +61,7 @@ pub(crate) struct Behind<'a> {
     pub picture: &'a Picture,
 }
 
-/// What the light of a picture depends on beside the bodies.
+/// Everything besides the bodies on which the light of a picture depends.
 #[derive(Clone, Debug, PartialEq)]
 struct Look {
     lights: Vec<Light>,
@@ -77,8 +77,8 @@ impl Clone for Memory {
 }
 
 impl Memory {
-    /// What is kept for a camera, if bodies have changed last in the steps `changes`. There is
-    /// nothing in its first picture.
+    /// The background of a camera, if the bodies last changed in the steps `changes`. It is empty
+    /// for the camera's first picture.
     pub fn background(&mut self, view: &View<'_>, changes: impl Iterator<Item = u64>) -> &mut Background {
         let found = self.cameras.iter().position(|b| b.is_of(view)).map(|at| self.cameras.remove(at));
         let background = match found {

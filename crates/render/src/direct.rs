@@ -8,8 +8,8 @@ use crate::stage::{BundleCandidates, Stage, StageHit, Surface};
 use glam::Vec3A;
 
 /// A light casts no shadow if its distance to the eye is less than this share of its distance to
-/// the surface. What such a light does not reach is hidden from the eye too, except for a rim at
-/// edges as thin as that share of the depth behind them.
+/// the surface. A surface that such a light does not reach is hidden from the eye too. Only a rim
+/// at edges remains, as thin as that share of the depth behind them.
 pub(crate) const BESIDE_EYE_SHARE: f32 = 0.1;
 
 /// A visible surface point and the light it sends to the eye.
@@ -68,8 +68,7 @@ pub(crate) struct ShadowBuffers {
 }
 
 /// Adds the light of all lamps to the visible points of a tile. With `shadows`, lamps that are not
-/// beside the `eye` cast them. Shadow rays start at the lamp, so that the rays of a tile form a
-/// bundle.
+/// beside the `eye` cast them. Shadow rays start at the lamp: the rays of a tile form a bundle.
 pub(crate) fn light(
     stage: &Stage,
     eye: Vec3A,

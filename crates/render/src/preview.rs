@@ -44,8 +44,8 @@ pub(crate) fn preview(picture: &mut Picture, stage: &mut Stage, view: &View<'_>,
     stage.memory = memory;
 }
 
-/// Draws and lights the bodies at rest, if others are than before. What has come to rest is drawn
-/// before what is kept. Only pixels that show another triangle are lit.
+/// Draws and lights the bodies at rest, if they differ from before. Bodies that have newly come to
+/// rest are drawn over the kept ones. Only pixels that show another triangle are lit.
 fn keep(background: &mut Background, stage: &Stage, view: &View<'_>, film: &Film) {
     let mut before = None;
     if background.is_stale() {

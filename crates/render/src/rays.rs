@@ -109,7 +109,8 @@ impl RayGenerator {
         self.height
     }
 
-    /// What the rays follow from: the camera model, and the radius of the circular image (px).
+    /// The lens that determines the rays: the camera model, and the radius of the circular image
+    /// (px).
     pub(crate) fn lens(&self) -> (CameraModel, Option<f32>) {
         (self.model, self.circle)
     }

@@ -29,7 +29,7 @@ pub enum Error {
     Invalid {
         /// The object and its field.
         what: String,
-        /// What is wrong with it and the remedy.
+        /// The reason and the remedy.
         reason: String,
     },
     /// A number is not finite. The state is unchanged.

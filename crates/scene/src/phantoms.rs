@@ -1,7 +1,7 @@
 //! The phantoms that a scene may name, with their organs.
 //!
-//! Kept here and not asked of the crate that films them, so that a cell does not depend on
-//! recordings; a test holds the two together.
+//! They are listed here, not in the crate that films them, because a cell must not depend on
+//! recordings. A test compares both lists.
 
 /// A phantom as scenes know it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

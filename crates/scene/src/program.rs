@@ -10,7 +10,8 @@ const MAX_ENTRIES: usize = 64;
 /// Most bytes of a hint.
 const MAX_HINT: usize = 1000;
 
-/// What a task's expressions are about. Channels are judged anew with this and gates alone.
+/// The context of a task's expressions. With it and the gates alone, channels can be evaluated
+/// again.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TaskContext {
     /// Stages and aborts.
@@ -19,7 +20,7 @@ pub struct TaskContext {
     pub organ: String,
     /// The scene's arms with what they hold, left first.
     pub arms: Vec<(Side, InstrumentKind)>,
-    /// The task's own constants.
+    /// The task's constants.
     #[serde(default)]
     pub constants: BTreeMap<String, f64>,
     /// Names of the scene's cameras.
@@ -49,7 +50,7 @@ pub struct Program {
     pub order: StageOrder,
     /// Gates, as `gates.lift_mm`, and constants, as `constants.aside_mm`, with their values.
     pub constants: Vec<(String, f64)>,
-    /// What is measured beside the channels.
+    /// Measures in addition to the channels.
     pub measures: Vec<Measure>,
     /// The task is about an organ.
     pub needs_organ: bool,
@@ -153,7 +154,7 @@ impl Gates {
 }
 
 impl Scene {
-    /// What the expressions of the scene's task are about.
+    /// The context of the expressions of the scene's task.
     ///
     /// # Errors
     /// A task without stages.

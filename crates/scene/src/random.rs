@@ -1,5 +1,5 @@
-//! Random numbers by counting: a number depends on its key alone, so that what is drawn for one
-//! purpose never shifts what is drawn for another.
+//! Random numbers by counting: a number depends on its key alone. So a draw for one purpose never
+//! shifts a draw for another.
 
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 

@@ -150,7 +150,7 @@ fn folder_kind(path: &Path) -> &'static str {
     KINDS.iter().find(|(file, _)| path.join(file).is_file()).map_or("a folder", |(_, kind)| kind)
 }
 
-/// What to write instead of a key of earlier scenes.
+/// The replacement of a key of earlier scenes.
 fn moved(reason: String) -> String {
     const EARLIER: &str = "task.variation: unknown field";
     match reason.find(EARLIER) {

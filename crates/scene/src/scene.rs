@@ -236,10 +236,10 @@ impl Scene {
         toml::to_string(self).map_err(|e| Error::Write(e.to_string()))
     }
 
-    /// What replays know the scene by: xxh3 of its canonical form and of `contents`, the hashes of
-    /// what it names by path or as a phantom (the specimen, then the arms' model files in order).
-    /// The description and the specimen folder's path do not count, so that a scene may be
-    /// explained better and a folder may move.
+    /// The hash by which replays identify the scene: xxh3 of its canonical form and of `contents`,
+    /// the hashes of everything that it names by path or as a phantom (the specimen, then the arms'
+    /// model files in order). The description and the specimen folder's path do not count: a
+    /// description may change and a folder may move.
     ///
     /// # Errors
     /// As [`to_toml`](Self::to_toml).

@@ -178,8 +178,8 @@ impl Task {
         Ok(definition)
     }
 
-    /// The same task with its stages written out, so that what it asks for does not depend on the
-    /// program's built-in tasks.
+    /// The same task with its stages written out: its meaning no longer depends on the program's
+    /// built-in tasks.
     ///
     /// # Errors
     /// As [`definition`](Self::definition).

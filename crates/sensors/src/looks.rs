@@ -1,4 +1,4 @@
-//! What things look like: colours and surfaces of tissue, arms and instruments.
+//! Appearance of things: colours and surfaces of tissue, arms and instruments.
 
 use trocar_render::{Appearance, SurfaceKind};
 use trocar_scene::InstrumentKind;

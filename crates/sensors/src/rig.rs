@@ -84,8 +84,8 @@ impl CameraRig {
     pub fn without_cell(scene: &Scene, specimen: &Specimen, arms: &[(String, ArmPosture)]) -> Result<Self> {
         let placed = Placed::new(scene, specimen)?.specimen;
         let mut visible = CellStage::new(&placed, scene.placement.pose(), Some(scene))?;
-        // Lights depend on the recorded pose of the organs, so that pictures do not depend on the
-        // history of the cell.
+        // Lights depend on the recorded pose of the organs: pictures do not depend on the history
+        // of the cell.
         visible.rebuild()?;
         let room = Room { middle: middle(&placed) };
         let cameras = RigCamera::all(scene, specimen.camera.as_ref(), room, &mut visible.stage)?;

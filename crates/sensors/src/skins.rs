@@ -1,5 +1,5 @@
 //! The drawn surfaces of a specimen's organs and the postures of the arms: what moves in pictures
-//! of a cell. They need no renderer, so that they are also recorded and sent.
+//! of a cell. They need no renderer, and are therefore also recorded and sent.
 
 use crate::organ::{BoundSurface, OrganSkin, Piece};
 use crate::{Error, Result};

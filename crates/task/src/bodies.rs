@@ -1,5 +1,5 @@
-//! What channels and measures ask of a cell: the bodies that an organ is in, the node that is
-//! nearest to a point, and what is between blades.
+//! Queries of channels and measures to a cell: the bodies of an organ, the node nearest to a point,
+//! and the tissue between blades.
 
 use glam::DVec3;
 use trocar_cell::Cell;

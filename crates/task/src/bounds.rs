@@ -6,7 +6,7 @@ use trocar_cell::{Action, ActionSpace, Cell, ROLL_SPEED, Setpoint, TIP_SPEED, Wo
 /// Numbers an arm.
 const NUMBERS: usize = 5;
 
-/// What the numbers of a cell's actions are, and their range.
+/// The names of the numbers of a cell's actions, and their ranges.
 #[derive(Clone, Debug)]
 pub struct Bounds {
     space: ActionSpace,
@@ -43,9 +43,9 @@ impl Bounds {
         Ok(made)
     }
 
-    /// The action of these numbers. What lies outside is brought back to the edge, as a robot's own
-    /// limits do; the box of two pivots has corners that no shaft reaches, and those are brought
-    /// back too.
+    /// The action of these numbers. Numbers outside the limits are clamped to them, as a robot's
+    /// own limits do. The box of two pivots has corners that no shaft reaches, and those are
+    /// clamped too.
     ///
     /// # Errors
     /// Too few or too many numbers, or one that is not finite, by its name.

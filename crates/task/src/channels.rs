@@ -109,9 +109,9 @@ row! {
         mouth_share,
         /// Rotation that was asked for and that four degrees of freedom cannot do (degrees).
         rejected_deg,
-        /// The command stops short of what was asked.
+        /// The command stops short of the requested one.
         held_back,
-        /// Tissue pushed with more than an arm bears.
+        /// Tissue pushed with more than an arm withstands.
         load_limited,
         /// The axis of the instrument is inside an organ that its jaws do not hold.
         pierces,
@@ -124,7 +124,7 @@ row! {
 }
 
 row! {
-    /// The task in a period. What concerns tissue in jaws is zero while the grasper holds none of
+    /// The task in a period. Values about tissue in jaws are zero while the grasper holds none of
     /// the task's organ. Flags are 0 or 1.
     TaskChannels {
         /// Distance from the middle of the grasper's mouth to the organ's axis where the grasp gate
@@ -132,7 +132,7 @@ row! {
         grasp_distance_mm,
         /// The grasper holds the task's organ.
         grasped,
-        /// Organ coordinate of what it holds.
+        /// Organ coordinate of the tissue that it holds.
         grasp_s,
         /// Rise of the held tissue's centroid since (mm).
         lift_mm,
@@ -178,10 +178,10 @@ row! {
         diverged,
         /// Times that an instrument punctured an organ in the period.
         punctures,
-        /// Times that the axis of an instrument came into an organ with less force than punctures
-        /// it.
+        /// Times that the axis of an instrument came into an organ with less force than a puncture
+        /// needs.
         pierced,
-        /// Times that an instrument began to strain tissue beyond what tissue bears.
+        /// Times that an instrument began to strain tissue beyond its limits.
         overstretched,
         /// Times that an organ stayed strained with no instrument at it.
         folded,
@@ -202,8 +202,8 @@ pub struct Channels {
     pub right: ArmChannels,
     /// The task.
     pub task: TaskChannels,
-    /// What the task measures beside, in the order of its
-    /// [`Program`](trocar_scene::Program); zeros after.
+    /// The task's own measures, in the order of its [`Program`](trocar_scene::Program); the rest is
+    /// zero.
     pub measures: [f64; MAX_MEASURES],
 }
 
@@ -229,7 +229,7 @@ impl Channels {
         }
     }
 
-    /// Names of the numbers of a row but for what the task measures beside, in order: `time_s`,
+    /// Names of the numbers of a row, without the task's own measures, in order: `time_s`,
     /// `left_*`, `right_*`, then the task's.
     pub fn names() -> Vec<String> {
         let arm = |side: &'static str| ArmChannels::NAMES.into_iter().map(move |n| format!("{side}_{n}"));

@@ -22,7 +22,7 @@ pub enum End {
         /// Why.
         why: String,
     },
-    /// What the task names as an abort came to be.
+    /// An abort condition of the task held.
     Aborted {
         /// Its name.
         name: String,

@@ -1,5 +1,4 @@
-//! An episode: a scene's cell from a seeded start to an end, with what a policy sees, what is
-//! scored and what happened.
+//! An episode: a scene's cell from a seeded start to an end, with observations, scores and events.
 
 use crate::bodies::bodies_of;
 use crate::facts::Facts;
@@ -19,7 +18,7 @@ use xxhash_rust::xxh3::Xxh3;
 /// within it.
 pub const SETTLE_S: f64 = 1.0;
 
-/// What a step gives.
+/// The result of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
     /// The row: privileged, for scores and `info`.
@@ -32,7 +31,7 @@ pub struct Step {
     pub events: Vec<CellEvent>,
 }
 
-/// An episode's whole state; what follows from a restored one is the same to the bit.
+/// An episode's whole state. Steps after a restore are the same to the bit.
 #[derive(Clone, Debug)]
 pub struct EpisodeState {
     task: TaskName,
@@ -43,7 +42,7 @@ pub struct EpisodeState {
     now: Now,
 }
 
-/// What changes beside the cell.
+/// The state of an episode besides the cell.
 #[derive(Clone, Debug)]
 struct Now {
     seed: u64,
@@ -54,7 +53,7 @@ struct Now {
     end: Option<End>,
 }
 
-/// What a cell was built from, and its tissue when it had settled.
+/// The scene and specimen that a cell was built from, and its settled tissue.
 struct Built {
     /// See [`foundation`].
     scene: Scene,
@@ -88,7 +87,7 @@ pub struct Episode {
     threads: usize,
     built: Built,
     cell: Cell,
-    /// What was drawn for this episode, and the scene with it.
+    /// The drawn values of this episode, and the scene with them.
     drawn: Drawn,
     arranged: Scene,
     now: Now,
@@ -177,8 +176,9 @@ impl Episode {
     }
 
     /// Begins the episode of `seed`, with what the scene's variation draws for it. The same seed
-    /// gives the same bits, whatever was before. Takes milliseconds where only starts and cameras
-    /// are drawn. A cell that differs otherwise is built and settled anew, which takes seconds.
+    /// gives the same bits, whatever was before. It takes milliseconds where only starts and
+    /// cameras are drawn. Other differences need a new cell that settles first, which takes
+    /// seconds.
     ///
     /// # Errors
     /// A start that an arm does not reach; a cell that cannot be built so; a specimen that is not
@@ -187,7 +187,7 @@ impl Episode {
         self.reset_with(seed, self.scene.draw(seed))
     }
 
-    /// Begins the episode of `seed` with `drawn` instead of what would be drawn for it.
+    /// Begins the episode of `seed` with `drawn` instead of the values that the seed would draw.
     ///
     /// # Errors
     /// As [`reset`](Self::reset).
@@ -235,8 +235,8 @@ impl Episode {
         self.step_watched(action, &mut |_| {})
     }
 
-    /// The same with a `watch` that sees the cell after each tissue frame. What it does must not
-    /// change the steps that follow.
+    /// The same with a `watch` that sees the cell after each tissue frame. The `watch` must not
+    /// change the following steps.
     ///
     /// # Errors
     /// As [`step`](Self::step).
@@ -247,8 +247,8 @@ impl Episode {
         let report = match self.cell.step_watched(action, watch) {
             Ok(report) => report,
             Err(refused @ trocar_cell::Error::Action { .. }) => return Err(refused.into()),
-            // An arm whose numbers are lost: the last row that was right again, but for the time,
-            // that it diverged, and that nothing happened.
+            // An arm's numbers are lost. The row is the last valid one with three changes: the time
+            // advances, the episode diverged, and nothing happened.
             Err(lost) => {
                 self.now.end = Some(End::Diverged { why: lost.to_string() });
                 let mut channels = self.now.rows.last().copied().unwrap_or_default();
@@ -265,7 +265,7 @@ impl Episode {
         };
         let channels = self.now.subject.channels(&self.cell, &report)?;
         let abort = report.arms.iter().find(|a| a.rcm_over_abort);
-        // Whoever leaves the port, or loses the tissue, passes nothing by it.
+        // A period in which the instrument leaves the port, or loses the tissue, passes no stage.
         let mut aborted = None;
         if !channels.is_lost(Some(self.scene.safety.rcm_abort_mm)) {
             aborted = self.now.tracker.aborted(&channels);
@@ -292,7 +292,7 @@ impl Episode {
         Ok(Step { channels, progress, end, events: report.events })
     }
 
-    /// Ends the episode because its policy has nothing left to do.
+    /// Ends the episode because its policy has finished.
     pub fn finish(&mut self) {
         if self.now.end.is_none() {
             self.now.end = Some(if self.progress().passed() { End::Passed } else { End::Finished });
@@ -316,7 +316,7 @@ impl Episode {
         }
     }
 
-    /// What a policy sees now.
+    /// The observation of the present state.
     pub fn observe(&self) -> Observation {
         Observation::of(&self.cell.observe(), self.cell.time(), self.progress())
     }
@@ -341,7 +341,7 @@ impl Episode {
         &self.now.rows
     }
 
-    /// What happened so far, with times (s).
+    /// The events so far, with times (s).
     pub fn events(&self) -> &[(f64, CellEvent)] {
         &self.now.events
     }
@@ -361,12 +361,12 @@ impl Episode {
         &self.scene
     }
 
-    /// The scene with what was drawn for this episode: what pictures are made of.
+    /// The scene with the drawn values of this episode, from which pictures are made.
     pub fn arranged_scene(&self) -> &Scene {
         &self.arranged
     }
 
-    /// What was drawn for this episode.
+    /// The drawn values of this episode.
     pub fn drawn(&self) -> &Drawn {
         &self.drawn
     }
@@ -484,7 +484,7 @@ impl Episode {
     /// Hash over every bit that the future depends on, but for the seed's random numbers: cell and
     /// stages.
     pub fn state_hash(&self) -> u64 {
-        // What was recorded so far, and why the episode ended, decide nothing that follows.
+        // The recorded rows and events, and the reason for the end, do not affect later steps.
         let Now { seed: _, subject: _, tracker, rows: _, events: _, end: _ } = &self.now;
         let mut hash = Xxh3::new();
         hash.update(&self.cell.hash().to_le_bytes());
@@ -495,7 +495,7 @@ impl Episode {
     }
 }
 
-/// What a state is known by to belong to an episode: the scene and, where it has only one, the
+/// The key by which a state belongs to an episode: the scene and, where it has only one, the
 /// specimen. How long an episode may be does not matter.
 fn key(scene: &Scene, specimen: u64) -> Result<u64> {
     let mut scene = scene.clone();

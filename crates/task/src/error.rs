@@ -1,4 +1,4 @@
-//! What can go wrong with episodes and what is kept of them.
+//! Errors of episodes and of their files.
 
 use std::path::PathBuf;
 

@@ -1,5 +1,5 @@
-//! Figures of an episode that its channels do not have: what was grasped and how, how organs came
-//! to rest, what a cut left.
+//! Figures of an episode that its channels do not have: which tissue was grasped and how, how
+//! organs came to rest, what remained after a cut.
 
 use crate::Channels;
 use serde::{Deserialize, Serialize};
@@ -68,7 +68,7 @@ pub struct Severed {
     pub held: bool,
 }
 
-/// What details are made of.
+/// The inputs of the details.
 pub(crate) struct Facts<'a> {
     pub task: &'a Task,
     pub program: &'a Program,
@@ -126,7 +126,7 @@ impl Facts<'_> {
             CellEvent::Cut { parted: Some(cut), .. } => Some((*time, cut)),
             _ => None,
         });
-        // The first that severed; else how far they came.
+        // The first event that severed the organ; otherwise how far the blades came.
         let last = cuts.clone().next_back();
         let (time_s, cut) = cuts.find(|(_, cut)| cut.outcome == "severed").or(last)?;
         let mut cut = Severance::clone(cut);
@@ -161,7 +161,7 @@ impl Facts<'_> {
         let (force, weight, organ) = (self.jaw_force_n, self.organ_weight_n, &self.task.organ);
         let (bears, needs) = (2.0 * FRICTION * force, weight / (2.0 * FRICTION));
         Some(if needs > force {
-            // Rounded up, so that what is named is enough.
+            // Rounded up: the named force must be enough.
             let enough = (20.0 * needs).ceil() / 20.0;
             format!(
                 "it slipped: the {organ} weighs {weight:.2} N and jaws of {force} N bear 2 x {FRICTION} x {force} = {bears:.2} N; \

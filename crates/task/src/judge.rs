@@ -6,12 +6,12 @@ use trocar_scene::{Comparison, Condition, HintPart, Number, Operation};
 /// Rounding of times (s).
 const TICK: f64 = 1e-6;
 
-/// What a condition remembers between rows.
+/// The memory of a condition between rows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Memory {
-    /// Since when what a `for` is about has held without a break (s).
+    /// Time since which the condition of a `for` has held without a break (s).
     pub since: Vec<Option<f64>>,
-    /// The first part of a `then` has held, and what must hold meanwhile ever since.
+    /// The first part of a `then` has held, and its `during` part ever since.
     pub armed: Vec<bool>,
 }
 
@@ -31,8 +31,8 @@ pub(crate) struct Context<'a> {
 }
 
 impl Context<'_> {
-    /// Whether `condition` holds in this row. Every part of it is looked at in every row, so that
-    /// what it remembers does not depend on the other parts.
+    /// Whether `condition` holds in this row. Every part is evaluated in every row: the memory of
+    /// one part does not depend on the others.
     pub fn holds(&self, condition: &Condition, memory: &mut Memory) -> bool {
         match condition {
             Condition::Flag(number) => self.value(number, memory) > 0.0,

@@ -2,7 +2,7 @@
 //!
 //! An [`Episode`] steps a scene's cell from a seeded start to its [`End`]. Each step gives a row of
 //! [`Channels`]; stages, sweeps and summaries are functions of rows alone. An episode file holds
-//! the actions and a hash a step, so that anyone can run it again and compare.
+//! the actions and one state hash per step. Anyone can replay it and compare.
 
 mod bodies;
 mod bounds;

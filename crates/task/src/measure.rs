@@ -8,10 +8,10 @@ use glam::{DQuat, DVec3};
 use trocar_cell::{ArmObservation, Cell, CellEvent, CellReport};
 use trocar_scene::{Gates, InstrumentKind, Side};
 
-/// Jaw lift below which no follow ratio is told (m).
+/// Below this jaw lift no follow ratio is given (m).
 const MIN_JAW_LIFT: f64 = 1e-4;
 
-/// What of a cell the channels are about.
+/// The parts of a cell that the channels describe.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Subject {
     /// Name of the task's organ; its pieces after a cut are called `name.1` and so on.
@@ -22,7 +22,7 @@ pub(crate) struct Subject {
     pub cutter: Option<usize>,
     /// Targets of port-reach: blade tips in the cell (m), three an arm; empty for other tasks.
     pub targets: Vec<[DVec3; 3]>,
-    /// What the task measures beside.
+    /// The task's own measures.
     pub measures: Measures,
 }
 
@@ -45,7 +45,7 @@ impl Subject {
         bodies_of(cell, &self.organ)
     }
 
-    /// The row of a period that `report` tells of.
+    /// The row of the period of `report`.
     pub fn channels(&self, cell: &Cell, report: &CellReport) -> Result<Channels> {
         let bodies = self.bodies(cell);
         let mut row = Channels { time_s: report.time, ..Channels::default() };

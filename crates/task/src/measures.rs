@@ -1,4 +1,4 @@
-//! What a task measures beside the channels: distances, displacements and what is held where.
+//! A task's own measures besides the channels: distances, displacements, and which tissue is held.
 
 use crate::bodies::{MID_JAWS, between_blades, bodies_of, nearest};
 use crate::channels::flag;
@@ -10,12 +10,13 @@ use trocar_camera::Camera;
 use trocar_cell::Cell;
 use trocar_scene::{MAX_MEASURES, Measure, Part, Place, Scene, Side, Target};
 
-/// The measures of a task, and where what moves was at the episode's start (m, cell).
+/// The measures of a task, and the start positions of everything whose motion they measure (m,
+/// cell).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Measures {
     list: Vec<Measure>,
     origins: Vec<DVec3>,
-    /// What sees the parts of [`Measure::Visible`], in their order.
+    /// The views for the parts of [`Measure::Visible`], in their order.
     views: Vec<View>,
 }
 

@@ -7,7 +7,7 @@ use trocar_cell::ArmObservation;
 use trocar_robot::wrench::ForceKind;
 use trocar_scene::Side;
 
-/// What is seen of one arm; all zero where the scene has no such arm.
+/// The observation of one arm; all zero where the scene has no such arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ArmState {
     /// Two pivots (rad), insertion (m), roll (rad), jaw opening 0 to 1, as in an action. Of an arm
@@ -23,13 +23,13 @@ pub struct ArmState {
     pub rcm_m: f64,
     /// Force of the tissue on the instrument along the cell's axes (N).
     pub force_n: [f64; 3],
-    /// What that force is: 0 contact, 1 the constraint of a latched grasp.
+    /// Kind of that force: 0 contact, 1 the constraint of a latched grasp.
     pub force_kind: f64,
     /// The jaws hold tissue: 0 or 1.
     pub attached: f64,
 }
 
-/// What a policy sees at the end of a period. No tissue value is in it.
+/// The observation of a policy at the end of a period. No tissue value is in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Observation {
     /// Time since the episode's start (s).

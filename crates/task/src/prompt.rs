@@ -1,9 +1,9 @@
-//! What a task asks for, in words: for policies that read.
+//! The instruction of a task, in words, for policies that read text.
 
 use trocar_scene::{InstrumentKind, Scene};
 
-/// What the task of `scene` asks for, with the arms that hold the first grasper and the first
-/// cutter in it by their sides.
+/// The instruction of the task of `scene`, with the sides of the arms that hold the first grasper
+/// and the first cutter.
 ///
 /// This is the `prompt` that policies are shown, the `task_description` of Python's environments
 /// and the task in datasets.

@@ -1,4 +1,5 @@
-//! Episode files: what was done, so that anyone can do it again and compare every step.
+//! Episode files: the actions of an episode, with which anyone can replay it and compare every
+//! step.
 //!
 //! One line of JSON (scene text and hash, what was drawn, specimen hash, seed, program), then for
 //! every step the action's numbers and the state's hash after it as little-endian binary, then xxh3
@@ -41,7 +42,7 @@ pub struct Header {
     /// The scene as TOML, every value in it, with the specimen that was drawn and nothing that
     /// varies.
     pub scene: String,
-    /// What was drawn for the episode, as TOML: a replay draws nothing.
+    /// The drawn values of the episode, as TOML: a replay draws nothing.
     #[serde(default)]
     pub drawn: String,
     /// The folder that paths in the scene start from.
@@ -74,13 +75,13 @@ struct Line {
 /// An episode as it is kept.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EpisodeFile {
-    /// What it is an episode of.
+    /// The scene, specimen and seed of the episode.
     pub header: Header,
     /// Actions, each with the state's hash after it.
     pub steps: Vec<(Action, u64)>,
 }
 
-/// What a replay found.
+/// The result of a replay.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     /// Every step gave the recorded state.
@@ -90,7 +91,7 @@ pub struct Verdict {
     /// The first step that differs, counted from 1; 0 for the start.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub first_difference: Option<usize>,
-    /// What is different, in a sentence.
+    /// The difference, in a sentence.
     pub said: String,
     /// Program that recorded it.
     pub recorded_by: String,
@@ -98,8 +99,8 @@ pub struct Verdict {
     pub replayed_by: String,
 }
 
-/// What replays know a scene by: [`Scene::hash`] over the specimen's hash and the arms' model
-/// files.
+/// The hash by which replays identify a scene: [`Scene::hash`] over the specimen's hash and the
+/// arms' model files.
 ///
 /// # Errors
 /// A model file that cannot be read.
@@ -116,13 +117,13 @@ pub fn scene_hash(scene: &Scene, specimen: u64) -> Result<u64> {
 }
 
 /// The scene as an episode file keeps it: with the specimen of that episode, and without what
-/// varies between episodes. What was drawn is applied to it.
+/// varies between episodes. The drawn values are applied to it.
 fn recorded(scene: &Scene, drawn: &Drawn) -> Scene {
     Scene { specimen: drawn.specimen.clone(), variation: Variation::default(), ..scene.clone() }
 }
 
-/// The same with the task's stages written out, so that a replay does not depend on the program's
-/// built-in tasks. Files that were written before tasks were files do not have them.
+/// The same with the task's stages written out: a replay does not depend on the program's built-in
+/// tasks. Files that were written before tasks were files do not have them.
 fn written_out(scene: &Scene) -> Result<Scene> {
     Ok(Scene { task: scene.task.written_out()?, ..scene.clone() })
 }
@@ -257,7 +258,7 @@ impl EpisodeFile {
         Ok(scene)
     }
 
-    /// What was drawn for the episode.
+    /// The drawn values of the episode.
     ///
     /// # Errors
     /// A table that cannot be read.
@@ -295,8 +296,8 @@ impl EpisodeFile {
         Episode::begun(scene, supply, threads, self.header.seed, self.drawn()?)
     }
 
-    /// Does the episode again with `specimen` and compares every step. What differs is a verdict,
-    /// not an error. `watch` is asked before each step and returns false to stop.
+    /// Replays the episode with `specimen` and compares every step. A difference is a verdict, not
+    /// an error. `watch` is asked before each step and returns false to stop.
     ///
     /// # Errors
     /// An episode that cannot be built; [`trocar_cell::Error::Interrupted`] when `watch` stops it.
@@ -338,7 +339,7 @@ impl EpisodeFile {
                 return Ok(differs(Some(number), said));
             }
         }
-        // What the policy ended is not in the actions.
+        // The actions do not contain an end that the policy chose.
         if let Some(end) = &header.end {
             episode.end_again(end);
         }

@@ -19,13 +19,13 @@ pub const RESULT_FILE: &str = "result.json";
 pub struct Recording {
     /// Actions and hashes.
     pub file: EpisodeFile,
-    /// What the channels are of.
+    /// The description of the channels.
     pub info: ChannelsInfo,
     /// The rows.
     pub channels: Vec<Channels>,
-    /// What is kept beside the rows, none at first.
+    /// Additional columns beside the rows, none at first.
     pub beside: Vec<Column>,
-    /// What happened, with times (s).
+    /// The events, with times (s).
     pub events: Vec<(f64, CellEvent)>,
     /// The figures.
     pub summary: Summary,
@@ -57,7 +57,7 @@ impl Kept {
         &self.steps
     }
 
-    /// Names the policy anew: who acts may change on the way.
+    /// Renames the policy, because another one may take over during the episode.
     pub fn rename(&mut self, policy: &str) {
         policy.clone_into(&mut self.header.policy);
     }
@@ -91,7 +91,7 @@ impl Kept {
     }
 }
 
-/// What stands in `result.json`.
+/// The content of `result.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct EpisodeResult {
     /// Name of the scene.
@@ -107,7 +107,7 @@ pub struct EpisodeResult {
     /// The figures.
     #[serde(flatten)]
     pub summary: Summary,
-    /// What happened.
+    /// The events.
     pub events: Vec<TimedEvent>,
 }
 

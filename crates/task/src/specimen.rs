@@ -1,10 +1,10 @@
-//! What a replay knows a specimen by.
+//! The hash by which a replay identifies a specimen.
 
 use trocar_specimen::{End, MaterialModel, Pins, Specimen};
 use xxhash_rust::xxh3::Xxh3;
 
-/// xxh3 of what is simulated of a specimen: names, meshes, bases, materials, pins and the upward
-/// direction. Colours, facts and where it came from do not count.
+/// xxh3 of the simulated parts of a specimen: names, meshes, bases, materials, pins and the upward
+/// direction. Colours, facts and origin do not count.
 pub fn specimen_hash(specimen: &Specimen) -> u64 {
     let mut hash = Xxh3::new();
     let numbers = |hash: &mut Xxh3, all: &[f64]| all.iter().for_each(|x| hash.update(&x.to_bits().to_le_bytes()));

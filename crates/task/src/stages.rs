@@ -78,7 +78,7 @@ impl Progress {
 pub struct Tracker {
     program: Arc<Program>,
     progress: Progress,
-    /// What each stage's condition remembers, and then each abort's.
+    /// The memory of each stage's condition, and then of each abort's.
     memories: Vec<Memory>,
 }
 
@@ -175,7 +175,7 @@ impl Tracker {
     }
 }
 
-/// What counts of a progress before its stage has passed.
+/// The part of a progress that counts before its stage has passed.
 fn part(progress: f64) -> f64 {
     if progress.is_nan() { 0.0 } else { progress.clamp(0.0, 0.99) }
 }

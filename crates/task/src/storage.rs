@@ -25,8 +25,8 @@ const PARQUET: &[u8; 4] = b"PAR1";
 const FORMAT: &str = "trocar-channels";
 const VERSION: u32 = 4;
 
-/// What a column of this version was called in files of an earlier `version`. `None` for one that
-/// they do not have, which is read as zeros.
+/// The name of a column of this version in files of an earlier `version`. `None` for one that they
+/// do not have, which is read as zeros.
 fn name_in(version: u32, name: &str) -> Option<String> {
     let warnings = ["punctures", "pierced", "overstretched", "folded"];
     if version < 4 && (name.ends_with("_pierces") || warnings.contains(&name)) {
@@ -46,7 +46,7 @@ const MAX_ROWS: usize = 1_000_000;
 /// Largest file (bytes).
 const MAX_BYTES: u64 = 1 << 31;
 
-/// What a file of channels says of itself.
+/// The description in a file of channels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChannelsInfo {
     /// Name of the scene.
@@ -55,8 +55,8 @@ pub struct ChannelsInfo {
     pub task: TaskName,
     /// Its gates.
     pub gates: Gates,
-    /// What the task's expressions are about; `None` in files that were written before tasks were
-    /// files, which are of built-in tasks.
+    /// The task's checked expressions; `None` in files that were written before tasks were files,
+    /// which are of built-in tasks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub context: Option<TaskContext>,
     /// RCM deviation that episodes are scored against (mm).
@@ -73,7 +73,7 @@ pub struct ChannelsInfo {
     pub seed: u64,
 }
 
-/// What stands in the file.
+/// The content of the file.
 #[derive(Serialize, Deserialize)]
 struct Stored {
     format: String,
@@ -105,8 +105,8 @@ impl ChannelsInfo {
     }
 }
 
-/// A column beside the channels, with a number a row: what is known of an episode and no part of
-/// it. Readers of channels pass over it.
+/// An additional column with one number per row: data about an episode that is not part of it.
+/// Readers of channels skip it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     /// Its name, which no channel has.
@@ -211,7 +211,7 @@ pub fn read_channels(path: &Path) -> Result<(ChannelsInfo, Vec<Channels>)> {
     if (&file).read_exact(&mut start).is_err() || start != *PARQUET {
         return Err(invalid("is no Parquet file; name the folder of an episode, or its channels.parquet".to_owned()));
     }
-    // The decoder is not ours: what it trips over is a bad file, too.
+    // The decoder is a dependency: a file at which it panics is a bad file, too.
     catch_unwind(AssertUnwindSafe(|| decode(file)))
         .unwrap_or_else(|_| Err("is damaged: its pages cannot be decoded".to_owned()))
         .map_err(invalid)

@@ -74,7 +74,7 @@ pub struct Summary {
     pub score: f64,
     /// The stages with the times at which they passed.
     pub progress: Progress,
-    /// How it ended; None while it goes on.
+    /// How it ended; None while it runs.
     pub end: Option<End>,
     /// Simulated time (s).
     pub duration_s: f64,
@@ -113,7 +113,7 @@ pub struct Summary {
     pub rcm_peak_mm: f64,
     /// It never went beyond the scene's threshold (3 mm).
     pub rcm_within: bool,
-    /// What was beyond what tissue bears.
+    /// Counts of tissue beyond its limits.
     #[serde(flatten)]
     pub warnings: Warnings,
     /// The arms, left first.
@@ -121,10 +121,10 @@ pub struct Summary {
     /// Why not all stages passed, in one line.
     #[serde(default)]
     pub why: Option<String>,
-    /// What jaw force would bear the organ, where a grasp that presses slipped.
+    /// The jaw force that would carry the organ, if a grasp that presses has slipped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub advice: Option<String>,
-    /// What was drawn for the episode.
+    /// The drawn values of the episode.
     #[serde(default)]
     pub drawn: Option<Drawn>,
     /// Figures that channels do not have.
@@ -137,7 +137,7 @@ impl Summary {
     /// it is scored against.
     pub fn of(rows: &[Channels], progress: &Progress, end: Option<&End>, arms: &[&str], threshold_mm: f64) -> Self {
         let tasks = || rows.iter().map(|c| &c.task);
-        // What has blown up is told as a very large number: files have no infinity.
+        // An infinite value becomes a very large number: files have no infinity.
         let most = |f: fn(&Channels) -> f64| rows.iter().map(f).fold(0.0, f64::max).min(f64::MAX);
         let held = rows.iter().rfind(|c| c.task.grasped > 0.0).map(|c| c.task);
         let top = top_of_last_grasp(rows);
@@ -178,7 +178,7 @@ impl Summary {
         }
     }
 
-    /// Adds what the channels do not have.
+    /// Adds the figures that the channels do not have.
     pub(crate) fn add_facts(&mut self, facts: &Facts<'_>) {
         self.details = facts.details();
         self.why = why(facts.rows, facts, &self.progress, self.end.as_ref());
@@ -203,7 +203,7 @@ fn top_of_last_grasp(rows: &[Channels]) -> Option<TaskChannels> {
     top.map(|c| c.task)
 }
 
-/// `x`, or a very large number where it is none.
+/// `x`, or a very large number if it is not one.
 fn finite(x: f64) -> f64 {
     if x.is_nan() { f64::MAX } else { x.clamp(f64::MIN, f64::MAX) }
 }
@@ -256,7 +256,7 @@ fn off_by(all: &[ArmChannels], lag: f64, period: f64, of: &dyn Fn(usize) -> bool
     let tip = |a: &ArmChannels| glam::DVec3::new(a.tip_x_m, a.tip_y_m, a.tip_z_m);
     let commanded = |a: &ArmChannels| glam::DVec3::new(a.commanded_x_m, a.commanded_y_m, a.commanded_z_m);
     let back = if period > 0.0 { lag / period } else { 0.0 };
-    // The same rows for every lag, so that lags compare.
+    // The same rows for every lag: lags must be comparable.
     let first = if period > 0.0 { (MAX_LAG / period).ceil() as usize } else { 0 };
     let (mut sum, mut count) = (0.0, 0_usize);
     for k in (first.max(1)..all.len()).filter(|k| of(*k)) {

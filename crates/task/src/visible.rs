@@ -1,5 +1,5 @@
-//! What a camera sees of a part of an organ: a small depth picture of all organs and of the
-//! instruments' shafts, and beside it one of the part alone.
+//! How much of a part of an organ a camera sees: a small depth picture of all organs and of the
+//! instruments' shafts, and one of the part alone.
 
 use crate::bodies::bodies_of;
 use crate::{Error, Result};
@@ -14,7 +14,7 @@ use trocar_tissue::Body;
 /// Width of the picture (px); its height follows from the camera.
 const WIDTH: usize = 192;
 
-/// An instrument hides what is behind it: this far to either side of its axis, and this far from
+/// An instrument hides everything behind it: this far to either side of its axis, and this far from
 /// the pivot of its jaws back along the shaft and forward along the closed blades (m). Its axis is
 /// drawn in so many pieces, and those behind the camera are left out.
 const HALF_SHAFT: f64 = 0.0025;

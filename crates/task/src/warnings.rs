@@ -4,7 +4,7 @@ use crate::channels::TaskChannels;
 use serde::{Deserialize, Serialize};
 use std::iter::Sum;
 
-/// Events that real tissue would not survive, in an episode or in many. Physics goes on. The more
+/// Events that real tissue would not survive, in an episode or in many. Physics continues. The more
 /// there are, the less the motion is that of tissue.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
@@ -14,14 +14,14 @@ pub struct Warnings {
     /// Times that the axis of an instrument came into an organ that its jaws did not hold, with
     /// less force than punctures it.
     pub pierced: usize,
-    /// Times that an instrument began to strain tissue beyond what tissue bears.
+    /// Times that an instrument began to strain tissue beyond its limits.
     pub overstretched: usize,
     /// Times that an organ stayed strained with no instrument at it.
     pub folded: usize,
 }
 
 impl Warnings {
-    /// What the four numbers of [`Display`](std::fmt::Display) are.
+    /// The meaning of the four numbers of [`Display`](std::fmt::Display).
     pub const LEGEND: &str =
         "punctures / instruments that pierced an organ / organs overstretched / organs that stayed folded";
 

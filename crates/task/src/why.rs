@@ -12,7 +12,7 @@ const CLOSED_JAW: f64 = 0.05;
 /// Jaws that never come nearer to the organ than this are out of reach (mm): half of a blade.
 const OUT_OF_REACH_MM: f64 = 10.0;
 
-/// Why the episode of `rows` that ended as `end` says did not pass; `None` where it did or goes on.
+/// Why the episode of `rows` with the end `end` did not pass; `None` if it passed or still runs.
 pub(crate) fn why(rows: &[Channels], facts: &Facts<'_>, progress: &Progress, end: Option<&End>) -> Option<String> {
     match end? {
         End::Passed => None,

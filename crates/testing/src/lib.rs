@@ -1,4 +1,4 @@
-//! What tests of several crates share: damaged files for readers ([`fuzz_reader`]), and small
+//! Shared parts of tests of several crates: damaged files for readers ([`fuzz_reader`]), and small
 //! bodies, specimens and recordings.
 
 pub mod blocks;

@@ -77,7 +77,7 @@ impl Integrator for Comparator {
             accelerations[i] += force / mechanics.masses[i];
         }
         let span = Span { dt: frame.dt(), accelerations, fixed, targets };
-        // A body that reaches the speed limit stays as it is then: the stepper's report finds it.
+        // A body that reaches the speed limit keeps its state: the stepper's report finds it.
         let iterations = match method {
             Method::SemiImplicit { substeps, force } => {
                 semi_implicit::advance(mechanics, body.material(), particles, span, *substeps, force);

@@ -1,4 +1,4 @@
-//! What can go wrong while a minimum is sought.
+//! Errors of the search for a minimum.
 
 use crate::oracle::Failure;
 

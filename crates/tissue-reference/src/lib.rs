@@ -9,8 +9,8 @@
 //!
 //! The comparators advance the same body as the implicit solvers do (masses, energies, dashpots and
 //! support planes as the model holds them), but in double precision within a frame: their steps are
-//! so short that `f32` would round slow motion away. A body of which a node reaches the speed limit
-//! is left as it is at that instant, and the stepper reports it; nothing is clamped.
+//! so short that `f32` would round slow motion away. A body with a node at the speed limit keeps
+//! its state of that instant, and the stepper reports it. Nothing is clamped.
 
 #![forbid(unsafe_code)]
 

@@ -2,11 +2,11 @@
 //! from the velocities.
 //!
 //! Masses are lumped, and the elastic forces are the material's own. Two parts are stiffer than
-//! elements and are treated so that they do not limit the step: a dashpot acts as the impulse that
+//! elements, and their treatment must not limit the step. A dashpot acts as the impulse that
 //! implicit Euler gives its pair of vertices alone, one after another (it takes energy at any step
-//! and keeps both momenta), and friction stops at most the sliding that there is. The rest limits
-//! the step to 2/omega of the stiffest mode ([`stable_explicit_step`]): beyond it the method grows
-//! without limit, whatever its settings.
+//! and keeps both momenta). Friction stops at most the present sliding. The rest limits the step to
+//! 2/omega of the stiffest mode ([`stable_explicit_step`]): beyond it the method grows without
+//! limit, whatever its settings.
 
 use crate::mechanics::{Mechanics, Particles, Span, too_fast};
 use crate::stable_step::stable_explicit_step;
@@ -59,7 +59,7 @@ pub(crate) fn advance(
 }
 
 /// Stable neo-Hookean tissue whose volume barrier continues with its last slope below a volume
-/// ratio of [`MIN_VOLUME_RATIO`], so that inverted elements have stresses.
+/// ratio of [`MIN_VOLUME_RATIO`]: inverted elements have stresses, too.
 struct Unbarred(StableNeoHookean);
 
 impl Unbarred {

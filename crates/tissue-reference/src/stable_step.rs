@@ -22,7 +22,7 @@ fn greatest_frequency(body: &Body) -> f64 {
     let mut pinned = vec![false; body.len()];
     body.solver_numbers().iter().zip(body.pinned()).for_each(|(i, is)| pinned[*i as usize] = *is);
     let fixed = |i: usize| pinned[i];
-    // A start without symmetry, the same every time; u is M^(1/2) x, so that the matrix is
+    // A start without symmetry, the same every time. u is M^(1/2) x, which makes the matrix
     // symmetric.
     let mut u: Vec<DVec3> = (0..body.len())
         .map(|i| {

@@ -5,7 +5,7 @@
 //! an element, Macklin and Mueller, "A constraint-based formulation of stable neo-Hookean
 //! materials", 2021, solved together (Ton-That, Kry and Andrews, "Parallel block neo-Hookean XPBD
 //! using graph clustering", 2023). Support planes are constraints too. Dashpots act on the
-//! velocities after each substep, each pair by itself: as constraints they are a hundred times
+//! velocities after each substep, one pair at a time: as constraints they are a hundred times
 //! stiffer than the elements and undo their corrections, and the same meshes diverge.
 
 use crate::mechanics::{Mechanics, Particles, Span, too_fast};

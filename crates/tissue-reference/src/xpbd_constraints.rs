@@ -25,7 +25,7 @@ enum Law {
     Strains { law: Box<dyn Hyperelastic>, hooke: Hooke },
     /// |F| and J - alpha, solved together.
     NeoHookean { mu: f64, lambda: f64, alpha: f64 },
-    /// tr(F'F) - 3 and J - 1, each by itself.
+    /// tr(F'F) - 3 and J - 1, each separately.
     StrainTrace { mu: f64, lambda: f64 },
 }
 
@@ -217,7 +217,7 @@ fn solve(mut a: [[f64; 6]; 6], mut b: [f64; 6]) -> [f64; 6] {
     b
 }
 
-/// The correction of one constraint by itself; `compliance` is over h^2.
+/// The correction of one constraint alone; `compliance` is over h^2.
 fn one(value: f64, compliance: f64, gradients: &Gradients, w: &[f64; 4], multiplier: f64) -> f64 {
     let weight = product(gradients, gradients, w);
     if weight > 0.0 { -(value + compliance * multiplier) / (weight + compliance) } else { 0.0 }

@@ -27,7 +27,7 @@ pub enum XpbdSweep {
     },
 }
 
-/// What an element resists.
+/// The deformation that an element resists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum XpbdConstraints {
     /// The six Green strains together, with the compliance matrix of linear elasticity (XPBD's for

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 /// The solver of one body with its scratch memory.
 pub(crate) trait Solver: Send + Sync + Sized {
-    /// What the bodies of an island remember together of a search.
+    /// The memory that the bodies of an island share in a search.
     type History: Send + Sync;
 
     /// Whether bodies can touch each other.
@@ -33,7 +33,7 @@ pub(crate) trait Solver: Send + Sync + Sized {
     /// Ends the frame: the states are those at its end.
     fn end_frame(_island: &mut IslandFrame<'_, Self>) {}
 
-    /// What the body touched in the last frame. None for a solver without contact with tools.
+    /// The contacts of the body in the last frame. None for a solver without contact with tools.
     fn contacts(&self) -> Option<&ContactSet> {
         None
     }

@@ -240,7 +240,8 @@ impl ModelBuilder {
     }
 }
 
-/// What a piece of a body inherits from the whole, so that its positions and masses keep every bit.
+/// Quantities that a piece of a body inherits from the whole, in order to keep every bit of its
+/// positions and masses.
 pub(crate) struct Inherited {
     /// World position of the whole body's own origin (m).
     pub origin: DVec3,

@@ -1,4 +1,4 @@
-//! What can go wrong while a model is built. A built model cannot be wrong.
+//! Errors of building a model. A built model cannot be wrong.
 
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;

@@ -1,4 +1,4 @@
-//! What acts on a model during one frame, as its bodies see it.
+//! The loads on a model during one frame, as its bodies see them.
 
 use crate::grasp::travel;
 use crate::{Body, Collider, Grasp, Hole, Load, ToolContact, ToolMotion};

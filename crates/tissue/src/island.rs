@@ -13,7 +13,7 @@ pub(crate) struct Island<S: Solver> {
     bodies: usize,
     /// Where the bodies may touch each other.
     pub pairs: Pairs,
-    /// What their solvers remember together.
+    /// The shared memory of their solvers.
     pub history: S::History,
 }
 

@@ -1,10 +1,10 @@
-//! What never changes while stepping.
+//! The constant part of a simulation.
 
 use crate::{Backend, Body, BodyContact, Collider, ToolContact};
 use glam::DVec3;
 
 /// Everything that is constant over a simulation. Only [`crate::ModelBuilder`] and [`crate::sever`]
-/// make models, so that a model is always valid. A clone shares the bodies.
+/// make models: a model is always valid. A clone shares the bodies.
 #[derive(Clone, Debug)]
 pub struct Model {
     pub(crate) bodies: Vec<Body>,
@@ -43,7 +43,7 @@ impl Model {
         self.tool_contact
     }
 
-    /// What bears the tissue.
+    /// The solver backend of the tissue.
     pub fn backend(&self) -> Backend {
         self.backend
     }

@@ -58,7 +58,7 @@ impl Untangler {
         }
         state.v.fill(Vec3A::ZERO);
         state.warm.falling.fill(0.0);
-        // What one frame did not repair continues in the next.
+        // The next frame continues a repair that one frame did not finish.
         state.disturbed = least_ratio(body, &state.x) <= 0.0;
     }
 

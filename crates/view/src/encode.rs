@@ -1,4 +1,4 @@
-//! Makes frames of snapshots, in a thread of its own.
+//! Makes frames of snapshots in its own thread.
 
 use crate::frame::{Frame, OrganFrame};
 use crate::hub::Hub;
@@ -72,7 +72,7 @@ fn next((slot, news): &(Mutex<Slot>, Condvar)) -> Option<Box<Snapshot>> {
     }
 }
 
-/// What is kept from frame to frame.
+/// The state between frames.
 #[derive(Default)]
 struct Making {
     scene: Option<Arc<Vec<u8>>>,

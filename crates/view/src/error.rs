@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// What can go wrong.
+/// Errors of the viewer.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The server cannot listen.
@@ -21,7 +21,7 @@ pub enum Error {
         /// Why.
         source: std::io::Error,
     },
-    /// What was asked for cannot be shown, and what can.
+    /// The requested source cannot be shown; the text names those that can.
     #[error("{0}")]
     Source(String),
     /// A connection to a server ended.

@@ -1,4 +1,5 @@
-//! A frame as it is sent: built once, and put together for each client from what is new to it.
+//! A frame as it is sent: built once, and assembled for each client from the parts that are new to
+//! it.
 
 use crate::message::{Binary, Data};
 use crate::protocol::Overlay;
@@ -38,7 +39,7 @@ pub(crate) struct Frame {
     pub held: Option<Vec<f32>>,
 }
 
-/// What a client has.
+/// The parts that a client has already.
 #[derive(Debug, Default)]
 pub(crate) struct Has {
     topology: u64,
@@ -46,7 +47,8 @@ pub(crate) struct Has {
 }
 
 impl Frame {
-    /// The message for a client that `has` earlier frames; `value` is what it wants on the organs.
+    /// The message for a client that `has` earlier frames. `value` is the value that it wants on
+    /// the organs.
     pub fn message(&self, has: &mut Has, value: Option<Overlay>, dropped: u64, whole: bool) -> Vec<u8> {
         if whole || has.topology != self.topology || has.versions.len() != self.organs.len() {
             *has = Has { topology: self.topology, versions: vec![0; self.organs.len()] };

@@ -20,7 +20,7 @@ const VERSION: u32 = 1;
 /// Most requests for files and handshakes at a time, beside the clients.
 const MAX_REQUESTS: usize = 32;
 
-/// What all connections share.
+/// State that all connections share.
 struct Shared {
     hub: Arc<Hub>,
     token: String,
@@ -192,7 +192,7 @@ fn request(stream: &mut TcpStream, shared: &Shared) -> Option<Vec<u8>> {
     if version != VERSION.to_string() {
         return refused(stream, 404, &format!("this program has version {VERSION} of the wire"));
     }
-    // Of equal length, all bytes are compared, so that the time says nothing.
+    // If the lengths are equal, all bytes are compared: the time reveals nothing.
     let given = head.query("token").unwrap_or("").as_bytes();
     let own = shared.token.as_bytes();
     let differs = given.iter().zip(own).fold(0, |d, (a, b)| d | (a ^ b));

@@ -15,7 +15,7 @@ const HEAD_TIME: Duration = Duration::from_secs(5);
 /// How long an answer may take.
 const ANSWER_TIME: Duration = Duration::from_secs(20);
 
-/// What pages may load: everything from here, and nothing from elsewhere.
+/// Sources that pages may load: everything from here, and nothing from elsewhere.
 const POLICY: &str = "default-src 'self'; img-src 'self' blob: data:; connect-src 'self' ws:; media-src blob:; \
      worker-src 'self' blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
@@ -26,7 +26,7 @@ pub(crate) struct Head {
     pub path: String,
     pub query: String,
     pub headers: Vec<(String, String)>,
-    /// What came after the head.
+    /// Bytes after the head.
     pub rest: Vec<u8>,
 }
 
@@ -111,7 +111,7 @@ impl Head {
     }
 }
 
-/// Answers a request and ends it. What cannot be sent is lost.
+/// Answers a request and ends it. An answer that cannot be sent is lost.
 pub(crate) fn answer(stream: &mut TcpStream, status: u16, kind: &str, body: &[u8]) {
     let word = match status {
         200 => "OK",

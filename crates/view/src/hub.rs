@@ -16,7 +16,7 @@ pub(crate) const COMMAND_LIFE: Duration = Duration::from_millis(125);
 /// Raw inputs that are kept until the next period.
 const MAX_RAW: usize = 4096;
 
-/// What frames have to have for all clients together.
+/// The parts that frames need for all clients together.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Wants {
     pub stretch: bool,
@@ -46,7 +46,7 @@ struct People {
     last: ClientId,
     /// Who has each of [`Seat::ALL`].
     seats: [Option<ClientId>; 3],
-    /// What a new client is sent: status, scene, organs.
+    /// The first messages to a new client: status, scene, organs.
     status: Option<Outgoing>,
     scene: Option<Outgoing>,
     organs: Option<Outgoing>,
@@ -56,7 +56,7 @@ struct People {
 /// Range of the values on organs: stretch, and strain energy (J/m3).
 type Ranges = [[f32; 2]; 2];
 
-/// What connects clients and simulation.
+/// The connection between clients and simulation.
 pub(crate) struct Hub {
     /// Why clients may drive nothing, if they only watch.
     watched: Option<&'static str>,
@@ -210,7 +210,7 @@ impl Hub {
         }
     }
 
-    /// What frames have to have.
+    /// The parts that frames need.
     pub fn wants(&self) -> Wants {
         let mut all = Wants::default();
         for client in lock(&self.people).clients.values() {

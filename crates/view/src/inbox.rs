@@ -1,5 +1,5 @@
-//! What clients ask of the simulation, in order. It is bounded, and the simulation never waits for
-//! it but when it has nothing else to do.
+//! Requests of clients to the simulation, in order. The queue is bounded, and the simulation waits
+//! for it only when it has nothing else to do.
 
 use crate::protocol::{ArmName, Quality, RecordAction};
 use std::collections::VecDeque;
@@ -21,7 +21,7 @@ pub(crate) struct Request {
     pub wish: Wish,
 }
 
-/// What is asked.
+/// A request.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Wish {
     Play,
@@ -49,7 +49,7 @@ pub(crate) enum Wish {
     Table,
     /// A frame is wanted now: a client came, or wants other things in it.
     Refresh,
-    /// The client that drove this arm is gone.
+    /// The client that drove this arm has disconnected.
     Lost(ArmName),
 }
 
@@ -73,7 +73,7 @@ impl Inbox {
         if refresh && waiting.iter().any(|r| r.wish == Wish::Refresh) {
             return true;
         }
-        // What the program itself adds always fits: it is one request a client.
+        // The program's own requests always fit: there is one per client.
         let own = refresh || matches!(request.wish, Wish::Lost(_));
         if waiting.len() >= CAPACITY && !own {
             return false;

@@ -2,9 +2,9 @@
 //!
 //! A [`Server`] simulates in one thread, makes frames in another, and serves the page and the wire
 //! (docs/guides/view-wire.md) on a port of this machine. Each client has a slot for one frame: a
-//! slow one misses frames, and the simulation never waits. What clients send changes nothing but
-//! through the actions of the episode, so that what an operator does is an episode file. A
-//! [`Follower`] shows an episode that another program steps, to clients that only watch.
+//! slow one misses frames, and the simulation never waits. Clients change the episode only through
+//! its actions: everything that an operator does is in the episode file. A [`Follower`] shows an
+//! episode that another program steps, to clients that only watch.
 
 mod arm_columns;
 pub mod client;

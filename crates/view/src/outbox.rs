@@ -38,7 +38,7 @@ impl Outgoing {
 /// What waits for a client: replies in order, and the newest frame.
 #[derive(Default)]
 struct Outbox {
-    /// What waits, with the bytes that it takes beside what all clients share.
+    /// The waiting replies, each with its bytes that are not shared with other clients.
     replies: VecDeque<(Outgoing, usize)>,
     bytes: usize,
     frame: Option<Arc<Frame>>,
@@ -68,7 +68,7 @@ impl Outbox {
     }
 }
 
-/// What a client's writer does next.
+/// The next task of a client's writer.
 pub(crate) enum Next {
     Reply(Outgoing),
     /// The frame, how many were dropped, and whether it has all organs.
@@ -188,7 +188,7 @@ impl Client {
         outbox.whole = true;
     }
 
-    /// What the client wants.
+    /// The client's subscription.
     pub fn wants(&self) -> Subscription {
         lock(&self.outbox).wants.clone()
     }

@@ -17,17 +17,17 @@ pub(crate) enum Page {
     Missing,
 }
 
-/// What is shown without a page.
+/// The page that is shown if none is built.
 const MISSING: &str = "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>trocar view</title>\
      <body><h1>The page is not built</h1><p>This program is built from a clone of the repository. With Node 20 or \
      later, run <code>npm ci &amp;&amp; npm run build</code> in its folder <code>viewer</code>, then load this page \
      again. The wire for other clients works without it.</p></body></html>";
 
-/// What has to be run for a page, in a clone.
+/// The commands that build the page in a clone.
 const HOW: &str = "npm ci && npm run build";
 
-/// Builds the page where a clone has none and npm is there. What is to be done otherwise is
-/// returned in a line.
+/// Builds the page if a clone has none and npm is available. If that fails, it returns a line that
+/// says what to do.
 pub fn build_page() -> Option<String> {
     let folder = sources().filter(|_| Page::find() == Page::Missing)?;
     let shown = folder.canonicalize().unwrap_or_else(|_| folder.clone());

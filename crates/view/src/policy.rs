@@ -62,7 +62,7 @@ pub(crate) fn make(
     Ok(trocar_campaign::make_policy(&spec, episode, stop)?)
 }
 
-/// What an action asks of each arm, as absolute targets.
+/// The absolute target of each arm by an action.
 ///
 /// # Errors
 /// Numbers that are no pose.

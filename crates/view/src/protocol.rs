@@ -1,4 +1,4 @@
-//! What clients send (docs/guides/view-wire.md), checked.
+//! Messages of clients (docs/guides/view-wire.md), checked.
 
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -14,7 +14,7 @@ pub(crate) const SPEEDS: [f64; 7] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
 /// Range of the scale of motions.
 pub(crate) const SCALES: std::ops::RangeInclusive<f64> = 0.1..=1.0;
 
-/// What may be driven by one client at a time.
+/// The things that one client at a time may drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Seat {
@@ -56,7 +56,7 @@ impl ArmName {
     }
 }
 
-/// What is shown on the organs.
+/// The values that are shown on the organs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Overlay {
@@ -64,7 +64,7 @@ pub(crate) enum Overlay {
     Energy,
 }
 
-/// What a client wants to be sent.
+/// A client's subscription: the messages that it wants.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(default)]
 pub(crate) struct Subscription {
@@ -100,7 +100,7 @@ pub(crate) enum Axes {
     World,
 }
 
-/// What an operator wants of an arm.
+/// An operator's command to an arm.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Servo {
     /// The whole motion since the clutch was pressed.
@@ -126,7 +126,7 @@ pub(crate) struct Command {
     pub jaw: Option<f64>,
 }
 
-/// What is asked of the recorder.
+/// A command to the recorder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum RecordAction {
@@ -273,7 +273,7 @@ pub(crate) fn parse(text: &str) -> Result<(Option<i64>, Said), (Option<i64>, Mis
     }
 }
 
-/// What is wrong with the numbers of a message.
+/// The error in the numbers of a message, if any.
 fn check(said: &Said) -> Option<String> {
     let finite = |name: &str, all: &[f64]| {
         let lost = all.iter().find(|x| !x.is_finite() || x.abs() > 1e6);

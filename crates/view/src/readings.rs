@@ -1,4 +1,4 @@
-//! What frames and plots have of an episode: its rows, its stages, and what a frame's header says.
+//! Readings of an episode for frames and plots: its rows, its stages, and the header of a frame.
 
 use crate::message::{Binary, Data};
 use crate::operator::arm_of;

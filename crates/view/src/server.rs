@@ -13,10 +13,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::JoinHandle;
 
-/// What is shown, and how.
+/// The source of the view and its settings.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// What is shown.
+    /// The source that is shown.
     pub source: Source,
     /// How it is built.
     pub building: Building,
@@ -101,7 +101,7 @@ impl Server {
     /// Stops, and returns why the simulation had failed.
     ///
     /// # Errors
-    /// What is shown could not be built.
+    /// The source could not be built.
     pub fn stop(mut self) -> Result<()> {
         self.end()
     }

@@ -1,4 +1,4 @@
-//! What does not change from frame to frame: the messages `scene` and `organs`.
+//! The constant messages: `scene` and `organs`.
 
 use crate::arm_columns::ARM_COLUMNS;
 use crate::error::Result;

@@ -1,5 +1,5 @@
-//! An episode that is shown: what was done so far, states to come back to, and who acts at its
-//! head.
+//! An episode that is shown: its actions so far, states to return to, and the policy or operator
+//! that acts at its head.
 
 use crate::encode::Encoder;
 use crate::error::Result;
@@ -36,7 +36,7 @@ pub(crate) struct Live {
     ended: Option<End>,
     /// Who moved each arm (left, right) in each period.
     pub actors: Vec<[Actor; 2]>,
-    /// What pictures of it are made of, where it may be kept.
+    /// The surfaces of which its pictures are made, if it may be kept.
     pub surfaces: SurfaceWatch,
 }
 
@@ -44,7 +44,7 @@ pub(crate) struct Live {
 pub(crate) struct Show {
     pub episode: Episode,
     pub taker: Taker,
-    /// What is in pictures; the taker's meshes are of this scene.
+    /// The scene of the pictures, which is also that of the taker's meshes.
     drawn: Scene,
     /// `None` for an episode file.
     pub live: Option<Live>,
@@ -58,7 +58,7 @@ pub(crate) struct Show {
     pub lift: bool,
 }
 
-/// What a period needs from outside.
+/// Everything outside the episode that a period needs.
 pub(crate) struct Around<'a> {
     pub hub: &'a Hub,
     pub encoder: &'a Encoder,
@@ -112,7 +112,7 @@ impl Show {
         self.readings.note(&self.episode);
     }
 
-    /// Begins the live episode of `seed` by the policy of that name; `records` tells whether it may
+    /// Begins the live episode of `seed` by the policy of that name; `records` says whether it may
     /// be kept.
     ///
     /// # Errors
@@ -281,7 +281,7 @@ impl Show {
         Ok(Some(step.events))
     }
 
-    /// What the policy and the operator do now; `None` if the episode ends instead.
+    /// The next action of the policy and the operator; `None` if the episode ends instead.
     fn choose(&mut self, hub: &Hub, tick: Instant) -> Result<Option<Action>> {
         let Self { episode, live: Some(live), .. } = self else { return Ok(None) };
         if episode.end().is_some() {
@@ -289,7 +289,7 @@ impl Show {
         }
         let planned = live.operators.plan(episode.cell(), episode.scene(), &hub.commands(), tick)?;
         if planned.iter().all(Option::is_some) && !planned.is_empty() {
-            // The policy looks anew when it gets an arm back.
+            // The policy starts from the present state when it gets an arm back.
             live.chunk.clear();
             return Ok(Some(Action::targets(&planned.into_iter().flatten().collect::<Vec<_>>())));
         }

@@ -1,5 +1,5 @@
-//! What is copied from the cell for a frame. The simulation does this and no more; the frame is
-//! made in another thread.
+//! The copy of the cell for a frame. The simulation does this and no more; the frame is made in
+//! another thread.
 
 use crate::arm_columns::ARM_COLUMNS;
 use crate::error::Result;

@@ -14,13 +14,14 @@ use std::time::{Duration, Instant};
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Message, WebSocket};
 
-/// Time between signs of life, and the silence after which a client is gone.
+/// Time between pings, and the silence after which a client counts as disconnected.
 const PING_EVERY: Duration = Duration::from_secs(2);
 const SILENCE: Duration = Duration::from_secs(6);
 /// How long a message may take to be written.
 const WRITE_TIME: Duration = Duration::from_secs(4);
 
-/// What is read from a socket. What the protocol would write is the writer's to send.
+/// The reading side of a socket. It discards the protocol's own replies, because only the writer
+/// may write.
 struct ReadOnly(TcpStream);
 
 impl Read for ReadOnly {
@@ -39,7 +40,7 @@ impl Write for ReadOnly {
     }
 }
 
-/// What is written to a socket, a message at a time.
+/// The writing side of a socket, one message at a time.
 struct WriteOnly {
     stream: TcpStream,
     end: Instant,
@@ -61,7 +62,7 @@ impl Write for WriteOnly {
     }
 }
 
-/// Serves a client whose handshake is done until it is gone; `rest` came with the handshake.
+/// Serves a client after its handshake until it disconnects; `rest` came with the handshake.
 pub(crate) fn serve(stream: &TcpStream, rest: Vec<u8>, client: &Arc<Client>, hub: &Arc<Hub>) {
     let writer = stream.try_clone().and_then(|own| {
         let client = Arc::clone(client);
@@ -119,7 +120,7 @@ fn write(stream: TcpStream, client: &Client) {
     }
 }
 
-/// Reads what the client sends until it is gone, silent, or cut off.
+/// Reads the client's messages until it disconnects, is silent, or is cut off.
 fn read(stream: &TcpStream, rest: Vec<u8>, client: &Arc<Client>, hub: &Hub) {
     let Ok(own) = stream.try_clone() else { return };
     if own.set_read_timeout(Some(SILENCE)).is_err() {

@@ -1,4 +1,4 @@
-//! What is shown: a scene, a specimen, an episode, or a folder of episodes.
+//! The source of a view: a scene, a specimen, an episode, or a folder of episodes.
 
 use crate::error::{Error, Result};
 use crate::show::Show;
@@ -28,7 +28,7 @@ pub enum Source {
 }
 
 impl Source {
-    /// What the path or name `text` is.
+    /// The source of the path or name `text`.
     pub fn of(text: &str) -> Self {
         let path = Path::new(text);
         let has = |name: &str| path.join(name).is_file();
@@ -76,7 +76,7 @@ impl Source {
         }
     }
 
-    /// What it is, in a word.
+    /// Its kind, in a word.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Scene(_) => "scene",

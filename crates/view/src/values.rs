@@ -1,4 +1,4 @@
-//! What can be shown on organs: stretch and strain energy at the nodes.
+//! Values that can be shown on organs: stretch and strain energy at the nodes.
 
 use crate::shapes::Topology;
 use glam::{DMat3, DVec3};

@@ -17,7 +17,7 @@ pub enum Error {
     Truth {
         /// The file.
         path: PathBuf,
-        /// What is wrong and what would be right.
+        /// The reason and the remedy.
         reason: String,
     },
     /// A file or folder exists and is not overwritten.

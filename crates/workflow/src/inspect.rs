@@ -25,7 +25,7 @@ pub struct Inspection {
     pub depth_range_m: [f64; 2],
     /// Organs of the `.toml` with a mask, an outline or points.
     pub organs: Vec<String>,
-    /// What the organs of the `.toml` lack, one sentence each.
+    /// The data that the organs of the `.toml` lack, one sentence each.
     pub missing: Vec<String>,
     /// The topics of a log.
     pub topics: Vec<String>,

@@ -42,8 +42,8 @@ fn specimen_and_stamp(folder: &Path, max_elements: Option<u32>) -> (PathBuf, Pat
 
 /// `phantom`, recorded into `folder/recording` and reconstructed with the default settings into
 /// `folder/specimen`, or with about `max_elements` an organ at most into `folder/specimen-NUMBER`.
-/// A specimen of an earlier run is reused if the same program would make the
-/// same. Of several processes that need it at once, one makes it and the others wait.
+/// A specimen of an earlier run is reused if the same program would make the same. If several
+/// processes need it at once, one makes it and the others wait.
 ///
 /// # Errors
 /// A phantom that is not known, a folder that cannot be written.
@@ -75,7 +75,7 @@ pub fn specimen(
     recorded(phantom, options, &recording, progress)?;
     reconstruct_recording(&recording, &settings, &specimen, progress)?;
     std::fs::write(&path, &stamp).map_err(io)?;
-    // Reads it back, so that its bits do not depend on who made it.
+    // Reads the specimen back: its bits must not depend on who made it.
     Ok(Specimen::read(&specimen)?)
 }
 

@@ -18,7 +18,7 @@ pub(crate) fn averaged(image: &ColorImage, finer: usize) -> ColorImage {
     ColorImage { width, height, pixels: (0..width * height).map(pixel).collect() }
 }
 
-/// A colour per label. Hues are steps of the golden angle, so that neighbours differ most.
+/// A colour per label. Hues are steps of the golden angle, which makes neighbours differ most.
 pub(crate) fn label_color(label: u16) -> [u8; 3] {
     if label == 0 {
         return [0; 3];

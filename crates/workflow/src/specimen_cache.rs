@@ -47,8 +47,7 @@ impl SpecimenCache {
         Ok(made)
     }
 
-    /// Makes the specimens that are not there yet, one after the other, so that no episode waits
-    /// for one.
+    /// Makes the missing specimens one after another, before an episode needs them.
     ///
     /// # Errors
     /// As [`read`](Self::read); an interruption.
@@ -58,7 +57,7 @@ impl SpecimenCache {
             [one] => return self.read(one, progress).map(drop),
             _ => {}
         }
-        // Progress names what takes minutes, and not what is read in moments.
+        // Progress names the steps that take minutes, not those that take moments.
         let missing = sources.iter().filter(|source| !self.is_made(source)).count();
         let stage = match missing {
             0 => "specimens".to_owned(),

@@ -84,8 +84,8 @@ pub fn free_scene(specimen: &Specimen, folder: &Path, organ: &str, sever: bool) 
 }
 
 /// The paper's cell with the specimen in `folder`, and the reach of its tools. The specimen is
-/// placed so that both tools reach `organ`: with its middle below the midpoint of the ports, and
-/// turned about the vertical to the smallest miss of the tools.
+/// placed within reach of both tools: the middle of `organ` is below the midpoint of the ports, and
+/// the turn about the vertical is the one with the smallest miss of the tools.
 ///
 /// # Errors
 /// A specimen without that organ.
@@ -100,7 +100,7 @@ pub fn cell_scene(specimen: &Specimen, folder: &Path, organ: &str, name: &str) -
     let missed = |reach: &[ToolReach]| reach.iter().map(|r| r.missed_mm).fold(0.0, f64::max);
     let mut best: Option<(Scene, Vec<ToolReach>)> = None;
     for k in 0..TURNS {
-        // Small turns come first, so that the smallest of equal ones is used.
+        // Small turns come first: of equally good ones, the smallest is used.
         let turn = if k % 2 == 0 { k / 2 } else { -(k + 1) / 2 };
         let turn = std::f64::consts::TAU * f64::from(turn) / f64::from(TURNS);
         scene.placement = rounded(Frame::of(&placed(specimen, organ, turn)?));

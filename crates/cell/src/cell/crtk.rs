@@ -122,7 +122,7 @@ impl Cell {
         Ok(reached)
     }
 
-    /// Moves the joints, without regard to the port; the jaw's command stays.
+    /// Moves the joints without regard to the port. The jaw's command stays.
     ///
     /// # Errors
     /// An arm that the cell does not have or that has no joints, a wrong count of numbers, or one
@@ -149,7 +149,7 @@ impl Cell {
         Ok(())
     }
 
-    /// Organ, organ coordinate and centroid (m, cell frame) of what an arm's jaws hold.
+    /// Organ, organ coordinate and centroid (m, cell frame) of the tissue that an arm's jaws hold.
     ///
     /// # Errors
     /// An arm that the cell does not have.

@@ -31,7 +31,7 @@ impl Waiting {
         if self.0.len() > periods { self.0.pop_front().flatten() } else { None }
     }
 
-    /// Every number of it, for the hash; none where nothing waits.
+    /// All its numbers, for the hash; none if no command waits.
     pub fn numbers(&self) -> impl Iterator<Item = f64> {
         let Self(waiting) = self;
         waiting.iter().flat_map(|action| match action {

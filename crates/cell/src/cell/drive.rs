@@ -79,8 +79,8 @@ impl Drive {
         }
     }
 
-    /// The place that the drive moves to next, which its filter delays behind the command; for an
-    /// ideal arm where it is.
+    /// The place to which the drive moves next: its filtered command. For an ideal arm it is the
+    /// present place.
     pub fn reference(&self) -> Setpoint {
         match self {
             Self::Dynamic(arm) => arm.setpoint_coordinates().into(),
@@ -88,7 +88,7 @@ impl Drive {
         }
     }
 
-    /// Stops the reference where it is.
+    /// Stops the reference at its present place.
     pub fn halt(&mut self) {
         match self {
             Self::Dynamic(arm) => arm.halt(),
@@ -213,8 +213,8 @@ impl IdealState {
         Self { at, to: at, left: 0, rates: [0.0; 4] }
     }
 
-    /// Moves by `share` of an equal part of the remaining way. A part of a step counts as none, so
-    /// that the rest of the way takes as long as before.
+    /// Moves by `share` of an equal part of the remaining way. A part of a step does not count as a
+    /// step: the rest of the way takes as many steps as before.
     fn step(&mut self, share: f64, dt: f64) {
         let before = self.at;
         if self.left > 0 {

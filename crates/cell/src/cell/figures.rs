@@ -1,4 +1,5 @@
-//! What tasks measure besides observations: tissue that jaws carry, and tissue between blades.
+//! Measures of tasks that observations do not contain: tissue that jaws hold, and tissue between
+//! blades.
 
 use super::Cell;
 use crate::gripper::{BLADE_WIDTH, JAW_REGION_BEGIN};

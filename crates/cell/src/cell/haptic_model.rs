@@ -22,8 +22,8 @@ pub struct HapticModel {
 }
 
 impl Cell {
-    /// The local model of the tissue at the instrument of `arm` after the last period. The next
-    /// periods have the same bits with and without it.
+    /// The local model of the tissue at the instrument of `arm` after the last period. Calling it
+    /// does not change the bits of later periods.
     ///
     /// # Errors
     /// An arm that the cell does not have.
@@ -35,7 +35,8 @@ impl Cell {
         let tools = unit.model.tools;
         let tools = [tools.gripper, tools.blades[0], tools.blades[1]];
         let mut stiffness = world.stepper.tool_stiffness(&world.model, &world.state, &tools, tip.translation);
-        // Nodes that follow exactly have no spring: what the frames showed stands in for it.
+        // Nodes that follow the jaws exactly have no spring. The stiffness that earlier frames
+        // showed takes its place.
         if unit.state.held.is_some() && matches!(unit.state.design, GraspDesign::RestPose | GraspDesign::LivePose) {
             (0..3).for_each(|c| stiffness[c][c] += unit.state.exchange.stiffness());
         }

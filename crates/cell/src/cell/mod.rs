@@ -125,7 +125,7 @@ pub struct Cell {
     /// Motions of the tools in the last frame.
     motions: Vec<ToolMotion>,
     edges: Edges,
-    /// What instruments push beside each other.
+    /// Everything that instruments push, except each other.
     solids: Solids,
     /// Which contacts there are.
     contact: ContactParts,
@@ -187,8 +187,8 @@ impl Cell {
         })
     }
 
-    /// The gap between the two instruments now (m): negative where they press on each other, by as
-    /// much as they yield.
+    /// The gap between the two instruments now (m). It is negative while they press on each other:
+    /// then it is the depth by which they yield.
     pub fn clearance(&self) -> f64 {
         match &self.arms[..] {
             [one, other] => solid::clearance(&one.rods(), &other.rods()),
@@ -229,8 +229,8 @@ impl Cell {
         self.arms.iter().map(|arm| !arm.pierces(&self.world).is_empty()).collect()
     }
 
-    /// The organs in a hole of which the instrument of arm `k` is, by their bodies, in the order in
-    /// which it went into them; none if the arm does not exist.
+    /// The organs that the instrument of arm `k` has punctured and is still in, by their bodies, in
+    /// the order of the punctures. Empty if the arm does not exist.
     pub fn punctured_by(&self, k: usize) -> Vec<usize> {
         let tool = self.arms.get(k).map(|arm| arm.model.tools.gripper);
         let holes = self.world.state.holes.iter().filter(|hole| tool.is_some_and(|tool| hole.tools.contains(&tool)));

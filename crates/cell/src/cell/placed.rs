@@ -96,7 +96,7 @@ fn move_organ(organ: &mut Organ, pose: &Pose) {
     }
 }
 
-/// What bears the tissue of a scene.
+/// The solver backend of the tissue of a scene.
 fn backend(tissue: &Tissue) -> Backend {
     match tissue.backend {
         BackendName::Tetrahedra => Backend::Tetrahedra,

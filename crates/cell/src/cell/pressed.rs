@@ -1,8 +1,7 @@
 //! How hard an instrument was pressed against each organ in the last moments.
 //!
 //! An instrument that comes through the surface of an organ within a frame was stopped by it in the
-//! frames before, or in this one. So the largest force of some frames tells how hard it was
-//! pressed.
+//! frames before, or in this one. So the largest force of several frames shows how hard it pressed.
 
 use super::solid::Meeting;
 use glam::DVec3;

@@ -20,7 +20,7 @@ pub struct TaggedForce {
     pub wrench: Wrench,
 }
 
-/// What is measured of one arm at the end of a control period.
+/// The measurements of one arm at the end of a control period.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArmObservation {
     /// Which arm.
@@ -139,7 +139,7 @@ pub enum CellEvent {
         /// Force with which tissue pushed the blades apart (N).
         closing_force_n: f64,
     },
-    /// Jaws opened, or the tissue between them is gone.
+    /// The jaws opened, or they no longer have tissue between them.
     Released {
         /// The arm.
         arm: Side,
@@ -156,7 +156,7 @@ pub enum CellEvent {
         /// Pull at which it tore (N).
         force_n: f64,
     },
-    /// A cutter has closed through tissue as far as it goes: through all of it, to the scene's
+    /// A cutter has closed through tissue as far as it gets: through all of it, to the scene's
     /// gate, or until it opens again.
     Cut {
         /// The arm.
@@ -173,9 +173,9 @@ pub enum CellEvent {
         #[serde(skip_serializing_if = "Option::is_none")]
         parted: Option<Box<Severance>>,
     },
-    /// The instrument has punctured an organ: it came through the surface and had pressed on it
-    /// with at least the scene's `safety.puncture_force_n`. Around the hole it does not touch the
-    /// organ until it is out.
+    /// The instrument has punctured an organ: it came through the surface after it had pressed on
+    /// it with at least the scene's `safety.puncture_force_n`. Around the hole, it has no contact
+    /// with the organ until it is out.
     Punctured {
         /// The arm.
         arm: Side,
@@ -189,7 +189,7 @@ pub enum CellEvent {
         force_n: f64,
     },
     /// The axis of the instrument came into an organ that its jaws do not hold, with less force
-    /// than punctures it.
+    /// than a puncture needs.
     Pierced {
         /// The arm.
         arm: Side,
@@ -208,7 +208,7 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest.
         volume: f64,
     },
-    /// An organ stays strained without an instrument at it.
+    /// An organ stays strained with no instrument near it.
     Folded {
         /// Name of the organ.
         organ: String,

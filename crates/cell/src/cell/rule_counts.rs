@@ -1,8 +1,8 @@
-//! How often the force guard acted, and what was beyond what tissue bears.
+//! How often the force guard acted, and how often tissue was beyond its limits.
 
 use serde::Serialize;
 
-/// Counts of a control period. None of them stands for a change of physics.
+/// Counts of one control period. None of them changes the physics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct RuleCounts {
     /// Commands that the force guard shortened.

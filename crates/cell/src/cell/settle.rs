@@ -17,7 +17,7 @@ const MAX_DAMPING_S: f64 = 5.0;
 /// Damping ends after the organs have been slow for this long without it (s).
 const SLOW_S: f64 = 0.2;
 
-/// How organs came to rest.
+/// How the organs came to rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Settling {
     /// Largest node speed after the settling time, before any damping (m/s).

@@ -32,11 +32,11 @@ impl Cell {
         (report, clock.elapsed())
     }
 
-    /// Holds the tissue that `other` holds; to be called after each control period of `other`. What
-    /// it has grasped in that period is grasped here too, where it is here, and what it has
-    /// released is released. So a cell whose instruments touch nothing, and whose jaws therefore
-    /// never close on anything, lifts the same tissue. Both cells must have the same specimen,
-    /// uncut.
+    /// Holds the tissue that `other` holds. Call it after each control period of `other`. Tissue
+    /// that `other` grasped in that period is grasped here too, at its place in this cell. Tissue
+    /// that it released is released. So a cell whose instruments touch nothing, and whose jaws
+    /// therefore never close on anything, lifts the same tissue. Both cells must have the same
+    /// specimen, uncut.
     ///
     /// Friction alone ([`crate::GraspDesign::Friction`]) holds nothing without contact.
     pub fn hold_as(&mut self, other: &Self) {

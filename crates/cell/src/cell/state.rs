@@ -39,7 +39,7 @@ impl CellState {
                 hash.update(&number.to_bits().to_le_bytes());
             }
         }
-        // Nothing where nothing waits: hashes of cells without a delay are those of earlier
+        // No numbers if nothing waits: hashes of cells without a delay equal those of earlier
         // versions.
         waiting.numbers().for_each(|number| hash.update(&number.to_bits().to_le_bytes()));
         hash.digest()
@@ -49,7 +49,7 @@ impl CellState {
 impl Cell {
     /// The present state.
     pub fn save(&self) -> CellState {
-        // Each field is named, so that one that is added is kept or left out on purpose.
+        // Each field is named, because a new field must be kept or left out on purpose.
         let Self {
             world,
             arms,

@@ -58,8 +58,8 @@ impl Default for TetgenMesher {
 }
 
 impl Mesher for TetgenMesher {
-    /// Runs the program in a temporary folder. Elements with negative volume are flipped. Of
-    /// several parts the largest is kept.
+    /// Runs the program in a temporary folder. Elements with negative volume are flipped. If there
+    /// are several parts, the largest is kept.
     fn mesh(&self, surface: &TriMesh) -> Result<TetMesh> {
         check(surface)?;
         if !surface.is_watertight() {

@@ -7,7 +7,7 @@
 //! selective integration techniques", 1978).
 //!
 //! A law is a function of the signed singular values s of F. Its second derivative is diagonal in
-//! known modes, so that it can be projected exactly (Smith, De Goes and Kim, "Analytic eigensystems
+//! known modes, which allows an exact projection (Smith, De Goes and Kim, "Analytic eigensystems
 //! for isotropic distortion energies", 2019).
 
 mod corotated;

@@ -45,8 +45,8 @@ impl BoxTree {
         }
     }
 
-    /// Descends from `entry` while the beam meets few children, so that its rays need not do so one
-    /// by one. Calls `found` with entries that together contain everything the rays may meet, each
+    /// Descends from `entry` while the beam meets few children, so its rays need not do so one by
+    /// one. Calls `found` with entries that together contain everything the rays may meet, each
     /// with its minimum distance.
     pub fn narrow(&self, beam: &Beam, entry: u32, near: f32, mut found: impl FnMut(f32, u32)) {
         // Each split adds one open entry.

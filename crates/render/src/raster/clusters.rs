@@ -22,7 +22,7 @@ pub(crate) struct Clusters {
     bounds: Bounds,
 }
 
-/// What does not change when the shape deforms.
+/// The part that stays the same when the shape deforms.
 #[derive(Debug)]
 pub(crate) struct Fixed {
     pub clusters: Vec<Cluster>,

@@ -2,7 +2,7 @@
 
 use glam::Vec3A;
 
-/// A vertex of a shape. What a pixel needs of it lies together.
+/// A vertex of a shape. The data that a pixel needs of it are adjacent in memory.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Vertex {
     pub position: [f32; 4],

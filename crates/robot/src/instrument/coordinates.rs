@@ -109,7 +109,7 @@ impl Limits {
     }
 
     /// The nearest coordinates within the limits, and the excess. Too large a tilt is reduced in
-    /// its own direction, so that continuous motions stay continuous. Numbers that are not finite
+    /// its own direction, which keeps continuous motions continuous. Numbers that are not finite
     /// stay so.
     pub fn clamp(&self, wanted: &Coordinates) -> (Coordinates, Excess) {
         let mut excess = Excess::default();

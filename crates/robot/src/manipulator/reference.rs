@@ -7,11 +7,10 @@
 //! spline is 1.5 command periods (50 ms) behind a signal whose samples are the commands, and one
 //! (33 ms) behind the mean of the held commands.
 //!
-//! The spline runs in the instrument's coordinates, so that the shaft's axis goes through the
-//! port's centre at every instant, not only at the commands. The joints follow by one or two Newton
-//! steps a physics step; the null space drifts towards the arm's home posture and away from limits.
-//! If the arm cannot follow (a joint at a limit or too fast), the spline's time slows down or
-//! stops.
+//! The spline runs in the instrument's coordinates. So the shaft's axis passes the port's centre at
+//! every instant, not only at the commands. The joints follow by one or two Newton steps a physics
+//! step; the null space drifts towards the arm's home posture and away from limits. If the arm
+//! cannot follow (a joint at a limit or too fast), the spline's time slows down or stops.
 
 use crate::chain::{Joints, ROTATION_LEVER, SerialArm, TASK_ROWS, rotation_vector, solve_task};
 use crate::instrument::{Coordinates, Instrument, Limits, coordinates};
@@ -49,8 +48,8 @@ const MAX_POSE_ERROR: f64 = 2e-6;
 /// Rate of the null-space drift (1/s).
 const DRIFT_RATE: f64 = 4.0;
 /// Speed of the instrument at which the drift has its full rate (coordinates a second, insertions
-/// times five). It drifts only while the instrument moves: a joint that creeps while the instrument
-/// rests would stick and slip.
+/// times five). It drifts only while the instrument moves, because a joint that creeps while the
+/// instrument rests would stick and slip.
 const DRIFT_FULL_SPEED: f64 = 0.02;
 /// Distance from a limit at which joints are pushed away from it (rad or m).
 const LIMIT_MARGIN: f64 = 0.1;
@@ -213,7 +212,7 @@ impl Reference {
     /// Advances the spline.
     fn run(&mut self, context: &ReferenceContext<'_>, time: f64) {
         let period = context.period;
-        // A control point is computed in the first step after its time, so that it includes a
+        // A control point is computed in the first step after its time, in order to include a
         // command in between.
         while self.phase >= period * (1.0 - ROUNDING) {
             self.shift(context);

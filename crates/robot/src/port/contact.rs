@@ -1,8 +1,8 @@
 //! Forces between shaft and rim: a spring and a damper across the shaft, Coulomb friction along it.
 //!
 //! Friction is a spring to a mark on the shaft, up to Coulomb's limit; beyond it the mark slides. A
-//! load below the limit causes no creep. The marks are in the caller's [`RimState`], plain data, so
-//! that a step can be repeated.
+//! load below the limit causes no creep. The marks are in the caller's [`RimState`], plain data,
+//! which allows a step to be repeated.
 
 use super::port_model::Port;
 use super::rim::{Edge, RimPoint};

@@ -185,8 +185,8 @@ impl Port {
     }
 
     /// The roll that brings the tip nearest to an orientation at these pivots: the twist about the
-    /// shaft of what is left. Where a swing of half a turn is left too, every roll is as near, and
-    /// 0 is given.
+    /// shaft of the remaining rotation. If the remaining rotation includes a swing of half a turn,
+    /// every roll is equally near, and the result is 0.
     fn nearest_roll(&self, pivots: [f64; 2], orientation: DQuat) -> f64 {
         let shaft = (self.pose.rotation * turn(pivots)).inverse() * orientation * shaft_to_tip().inverse();
         if shaft.w.hypot(shaft.z) < 1e-12 {

@@ -1,4 +1,4 @@
-//! What an expression means in a scene: names are looked up, units compared, types checked.
+//! The meaning of an expression in a scene: names are resolved, units compared, types checked.
 
 use super::measure::{Measure, Part, Place, Target};
 use super::names::{Needs, channel, channel_names, unit_at_end};
@@ -24,7 +24,7 @@ pub(crate) enum Hints {
     Yes,
 }
 
-/// Gives expressions their meaning. What they need and measure gathers in it.
+/// Resolves the names and units of expressions, and collects their needs and measures.
 #[derive(Debug)]
 pub(crate) struct Checker<'a> {
     /// The task's organ.
@@ -50,7 +50,7 @@ pub(crate) struct Checker<'a> {
     pub in_progress: bool,
 }
 
-/// What a number is.
+/// The kind of a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Kind {
     unit: Unit,

@@ -1,4 +1,4 @@
-//! What tasks measure beside the channels that every episode has.
+//! Measures of tasks, besides the channels that every episode has.
 
 use crate::Side;
 use std::fmt::{Display, Formatter, Result};

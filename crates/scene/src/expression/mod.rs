@@ -2,8 +2,8 @@
 //! `not`, `for` a time, and `then`.
 //!
 //! [`syntax`] reads a text into a tree, [`check`] gives it meaning and units against the scene, and
-//! [`tree`] is what it then is. Nothing is executed here. Length and depth are bounded, so that no
-//! text can exhaust the stack.
+//! [`tree`] is what it then is. Nothing is executed here. Length and depth are bounded: no text can
+//! exhaust the stack.
 
 mod check;
 mod measure;

@@ -3,7 +3,7 @@
 use super::Unit;
 use crate::Side;
 
-/// What a channel is.
+/// The kind of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     /// 0 or 1.
@@ -13,7 +13,7 @@ enum Kind {
 
 use Kind::{Flag, In};
 
-/// What a task needs of a scene, by the channels that it names.
+/// The parts of a scene that a task needs, by the channels that it names.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Needs {
     pub organ: bool,

@@ -45,7 +45,7 @@ impl Unit {
         self.row().0
     }
 
-    /// What it measures, such as length.
+    /// The quantity that it measures, such as length.
     pub fn what(self) -> &'static str {
         self.row().1
     }

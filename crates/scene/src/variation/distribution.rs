@@ -1,4 +1,4 @@
-//! What a factor's value is drawn from.
+//! Distributions from which a factor's value is drawn.
 
 use crate::EpisodeRandom;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -57,7 +57,7 @@ impl Distribution {
         }
     }
 
-    /// What is wrong with its parameters, in words that follow the factor's name.
+    /// The error in its parameters, in words that follow the factor's name.
     pub(crate) fn mistake(&self) -> Option<String> {
         let finite = match self {
             Self::Within(most) => most.is_finite(),

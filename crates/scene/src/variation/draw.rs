@@ -62,7 +62,8 @@ fn axes(factor: Factor) -> &'static [&'static str] {
     if factor == Factor::Insertion { &["", "x", "y", "z"] } else { factor.axes() }
 }
 
-/// What was drawn for an episode. In files it is a table of numbers by their names, and `specimen`.
+/// The drawn values of an episode. In files they are a table of numbers by their names, and
+/// `specimen`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
     /// The specimen.
@@ -156,8 +157,8 @@ impl<'de> Deserialize<'de> for Drawn {
 }
 
 impl Scene {
-    /// What the episode of `seed` has. Each number depends on the seed, the factor and the part
-    /// only: a further factor changes no other.
+    /// The drawn values of the episode of `seed`. Each number depends on the seed, the factor and
+    /// the part only: a further factor changes no other.
     pub fn draw(&self, seed: u64) -> Drawn {
         let mut values = Vec::new();
         for (factor, distribution) in self.variation.all_factors() {

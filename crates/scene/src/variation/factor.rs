@@ -1,8 +1,8 @@
-//! What may differ between episodes: one row a factor.
+//! Factors that may differ between episodes, one row each.
 
 use std::ops::RangeInclusive;
 
-/// What a factor is drawn for: once an episode, or once for each part of that kind.
+/// How often a factor is drawn: once an episode, or once for each part of that kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Per {
     /// The whole cell.
@@ -44,12 +44,12 @@ macro_rules! factors {
                 match self { $(Self::$variant => &$axes),* }
             }
 
-            /// What it may be.
+            /// The range of its values.
             pub fn range(self) -> RangeInclusive<f64> {
                 match self { $(Self::$variant => $range),* }
             }
 
-            /// What it is, with how the number is applied.
+            /// Its description, with how the number is applied.
             pub fn about(self) -> &'static str {
                 match self { $(Self::$variant => $about),* }
             }

@@ -4,7 +4,7 @@ use crate::SpecimenSource;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Part of all episodes. The seed of an episode decides which part it belongs to, so that it can be
+/// Part of all episodes. The seed of an episode decides which part it belongs to: an episode can be
 /// run again by its seed alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

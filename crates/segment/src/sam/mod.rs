@@ -30,8 +30,8 @@ const DEFAULT_SIDE: usize = 1024;
 const MAX_SIDE: usize = 4096;
 
 /// SAM 2.1 from two ONNX files. Prompts are points on and off the target and a box, or else the
-/// outline, as a box and its innermost point. Of several masks, the one with the best predicted IoU
-/// is used.
+/// outline, as a box and its innermost point. SAM returns several masks, and the one with the best
+/// predicted IoU is used.
 #[derive(Debug)]
 pub struct Sam2 {
     folder: PathBuf,

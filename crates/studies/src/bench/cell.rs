@@ -108,7 +108,7 @@ impl Study for CellBench {
                     swing(&mut action, right, episode.time());
                 }
                 let before = episode.cell().timing().all;
-                // The order alternates, so that disturbances of the machine affect both.
+                // The order alternates: disturbances of the machine affect both.
                 if times.len().is_multiple_of(2) {
                     episode.step(&action)?;
                     apart.step(&action)?;

@@ -12,8 +12,8 @@ use trocar_workflow::{SOLVERS, check_interrupted, solver_named};
 const WARM_UP: usize = 3;
 const FRAMES: usize = 60;
 
-/// One schedule and number of threads. The variants are timed in turn, so that disturbances of the
-/// machine affect all.
+/// One schedule and number of threads. The variants take turns: disturbances of the machine affect
+/// all of them.
 #[derive(Clone, Debug, Serialize)]
 pub struct ManyRow {
     /// Name of the schedule.

@@ -279,7 +279,7 @@ impl Study for ViewBench {
         progress.begin("episodes", 2 * self.pairs as u64 + 2);
         let (mut shares, mut factors) = (Vec::new(), Vec::new());
         for pair in 0..self.pairs {
-            // The order changes, so that what changes with time does not count for one side.
+            // The order changes, because a drift with time must not favour one side.
             let mut walls = [0.0; 2];
             for watched in if pair % 2 == 0 { [false, true] } else { [true, false] } {
                 let (took, periods) = driver.episode(self.seed, watched)?;

@@ -6,7 +6,7 @@ use trocar_cell::{Cell, Cluster, Reached, Setpoint, clusters, reach_into};
 use trocar_core::Pose;
 pub(super) use trocar_core::interpolate::smoothstep as eased;
 
-/// Nodes within this organ coordinate to either side tell where the organ is there.
+/// Nodes within this organ coordinate to either side give the organ's place at a coordinate.
 const SLICE: f64 = 0.04;
 
 /// How far to either side the direction of the organ is taken from.
@@ -22,8 +22,8 @@ const FEWEST: usize = 8;
 /// A grasper takes tissue this far from the pivot (m): in the middle of its jaws.
 const DEPTH: f64 = 0.0115;
 
-/// Tissue wider than this (m) does not go between the blades there, which would press on it and on
-/// what lies beside it. Their ends then pinch its top: this far below its highest point (m), opened
+/// Tissue wider than this (m) does not fit between the blades, which would press on it and on
+/// neighbouring tissue. Their ends then pinch its top: this far below its highest point (m), opened
 /// by this share.
 const WIDE: f64 = 0.0115;
 const DIP: f64 = 0.0035;
@@ -44,7 +44,7 @@ const BLADES: f64 = 0.021;
 pub(super) struct Aim {
     pub pose: Pose,
     pub setpoint: Setpoint,
-    /// How far the tip stays from where it should be (m).
+    /// Distance of the tip from the wanted place (m).
     pub missed: f64,
     /// Organ coordinate.
     pub s: f64,

@@ -1,4 +1,4 @@
-//! Where a lifted organ is cut: between the grasp and what holds it.
+//! Where a lifted organ is cut: between the grasp and its attachment.
 
 use crate::{Episode, Error, Result};
 
@@ -42,7 +42,7 @@ fn between(held: &[f64], pins: &[f64], length: f64) -> std::result::Result<f64, 
     let towards_base = pins.iter().filter(|s| **s < middle).count();
     let towards_tip = pins.iter().filter(|s| **s > middle).count();
     let to_base = towards_base >= towards_tip;
-    // From the grasp towards what holds the organ (m).
+    // From the grasp towards the organ's attachment (m).
     let along = |s: f64| if to_base { middle - s } else { s - middle } * length;
     let grasp_ends = held.iter().map(|s| along(*s)).fold(0.0, f64::max);
     let end = along(if to_base { 0.0 } else { 1.0 });

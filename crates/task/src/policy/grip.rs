@@ -1,8 +1,9 @@
-//! How far jaws close on what they feel: at a share of the opening at which they met it.
+//! How far jaws close on tissue: to a share of the opening at which they met it.
 //!
-//! What lies between the blades gives way to the same share of its thickness, whatever its
-//! stiffness, and presses on them in proportion to that. So soft tissue is held with little force
-//! and not crushed, and stiff tissue with all the force that the jaws have, before they are there.
+//! Tissue between the blades is compressed to the same share of its thickness, whatever its
+//! stiffness, and presses on them in proportion to its stiffness. So soft tissue is held with
+//! little force and not crushed. Stiff tissue is held with all the force of the jaws, which do not
+//! reach that share.
 
 /// Force on the blades (N) from which on they have met something.
 const TOUCH: f64 = 0.002;
@@ -22,8 +23,8 @@ const LEAST_OPENING: f64 = 0.15;
 const FOLD: f64 = 1.4;
 
 /// Force on the blades (N) with which a fold of soft tissue bears its weight. Jaws that feel less
-/// close on until they feel it, in steps of this opening a period. Jaws that stop for 0.1 s take
-/// hold, and shorter steps would be stops.
+/// force close further until they feel it, in steps of this opening a period. Jaws take hold when
+/// they stop for 0.1 s, and shorter steps would count as stops.
 const BEARS: f64 = 0.18;
 const FOLD_STEP: f64 = 0.06;
 
@@ -54,13 +55,12 @@ impl Default for Grip {
 }
 
 impl Grip {
-    /// A closing begins, round tissue or, if it `folds`, on a fold of it.
+    /// Begins a closing: around tissue or, with `folds`, on a fold of it.
     pub fn begin(&mut self, folds: bool) {
         (self.touched, self.gathered, self.folds) = (None, None, folds);
     }
 
-    /// The opening to ask for, of jaws that are open by `opening` and pushed apart with `force`
-    /// (N).
+    /// The commanded opening for jaws that are open by `opening` and pushed apart with `force` (N).
     pub fn opening(&mut self, opening: f64, force: f64) -> f64 {
         if self.touched.is_none() && force > TOUCH {
             self.touched = Some(opening);
@@ -72,7 +72,7 @@ impl Grip {
         (self.share * touched).max(LEAST_OPENING).min(opening)
     }
 
-    /// The opening to ask for on a fold.
+    /// The commanded opening on a fold.
     fn fold(&mut self, touched: f64, opening: f64, force: f64) -> f64 {
         let least = (FOLD * self.share * touched).max(LEAST_OPENING);
         // After tissue was strained, the share is larger and the force smaller.
@@ -84,13 +84,13 @@ impl Grip {
         self.gathered.unwrap_or_else(|| if opening > least { least } else { (opening - FOLD_STEP).max(LEAST_OPENING) })
     }
 
-    /// What was held slipped: tighter next time.
+    /// The held tissue slipped: the next grasp is tighter.
     pub fn slipped(&mut self) {
         self.change(TIGHTER);
     }
 
-    /// Nothing was held: because tissue was strained beyond what it bears (`strained`), or because
-    /// the jaws did not close enough on it.
+    /// The grasp held nothing: the tissue was strained too much (`strained`), or the jaws did not
+    /// close enough on it.
     pub fn missed(&mut self, strained: bool) {
         self.change(if strained { LOOSER } else { TIGHTER });
     }

@@ -1,5 +1,5 @@
-//! Policies: what moves an episode. Six controllers come with the program: a scripted one that
-//! passes, and five that are worse in one way each.
+//! Policies: they choose the actions of an episode. Six controllers come with the program: a
+//! scripted one that passes, and five that are worse in one way each.
 
 mod aim;
 mod cut_place;
@@ -25,7 +25,7 @@ use trocar_cell::Action;
 /// Actions in a chunk.
 pub const CHUNK: usize = 8;
 
-/// Says what the arms do, a chunk of actions after the other.
+/// Chooses the actions of the arms, one chunk after another.
 pub trait Policy {
     /// Its name in files.
     fn name(&self) -> &str;
@@ -36,16 +36,16 @@ pub trait Policy {
     /// An episode that it cannot do.
     fn begin(&mut self, episode: &Episode, seed: u64) -> Result<()>;
 
-    /// The next 1 to [`CHUNK`] actions, one a control period. What is to be scored looks at
-    /// [`Episode::observe`] alone; scripts may look at the tissue too.
+    /// The next 1 to [`CHUNK`] actions, one a control period. A policy that is scored must use
+    /// [`Episode::observe`] alone; scripts may also read the tissue.
     ///
     /// # Errors
     /// Ends the episode as [`crate::End::PolicyError`].
     fn act(&mut self, episode: &Episode) -> Result<Vec<Action>>;
 
-    /// Whether it has nothing left to do. An episode whose policy gives no action and has finished
-    /// ends as [`crate::End::Finished`]; one whose policy gives none and has not, as a failure of
-    /// the policy.
+    /// Whether it has finished. An episode whose policy gives no action and has finished ends as
+    /// [`crate::End::Finished`]; one whose policy gives none and has not, as a failure of the
+    /// policy.
     fn finished(&self) -> bool {
         false
     }

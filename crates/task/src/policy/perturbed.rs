@@ -75,7 +75,7 @@ impl<P: Policy> Policy for Noise<P> {
             let (knot, share) = (at as u64, at.fract());
             let draw = |k: usize, n: u64| {
                 let index = |knot: u64| 16 * knot + 4 * k as u64 + n;
-                // Nothing at first, so that the start is the start.
+                // Zero at first: the start stays unchanged.
                 let value = |knot: u64| if knot == 0 { 0.0 } else { self.random.normal(index(knot)) };
                 value(knot) + share * (value(knot + 1) - value(knot))
             };

@@ -49,7 +49,7 @@ impl RandomActions {
                 bounds[2][0] = DEEP.clamp(bounds[2][0], bounds[2][1]);
             }
             let target = Setpoint(bounds.map(|[low, high]| self.within(low, high)));
-            // Of two pivots, three pairs of four are in their cone.
+            // About three quarters of all pairs of pivots are inside their cone.
             if workspace.clamp(&target).0[..2].iter().zip(&target.0).all(|(a, b)| (a - b).abs() < 1e-12) {
                 return target;
             }

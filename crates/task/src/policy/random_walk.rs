@@ -1,4 +1,4 @@
-//! Random motion: what no policy should be worse than.
+//! Random motion: the baseline that every policy should exceed.
 
 use super::aim::eased;
 use super::{CHUNK, Policy};

@@ -1,4 +1,4 @@
-//! What a scripted grasp-lift is asked for: its place, its height and its end.
+//! The options of a scripted grasp-lift: its place, its height and its end.
 
 use crate::{Error, Result};
 
@@ -11,20 +11,20 @@ pub enum CutAt {
     S(f64),
 }
 
-/// What a [`Script`] does after its hold.
+/// The actions of a [`Script`] after its hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum AfterHold {
     /// Nothing: it is finished.
     #[default]
     Finish,
-    /// Lowers what was lifted, lets go of it and is finished.
+    /// Lowers the tissue, releases it and finishes.
     Lower,
-    /// Cuts the organ between the grasp and what holds it, carries on what came loose and is
-    /// finished.
+    /// Cuts the organ between the grasp and its attachment, carries the loose piece further and
+    /// finishes.
     Cut(CutAt),
 }
 
-/// A grasp-lift with a place, a height and an end of its own choice.
+/// A grasp-lift with its own place, height and end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Script {
     /// Organ coordinate of the grasp, 0 to 1.
@@ -33,12 +33,11 @@ pub struct Script {
     pub approach_offset: f64,
     /// Lift of the jaws (m), in one second and held for another.
     pub lift: f64,
-    /// The jaws first drag the tissue sideways by this much (m), let go of it there and close
-    /// again.
+    /// The jaws first drag the tissue sideways by this much (m), release it there and close again.
     pub regrasp: Option<f64>,
-    /// Times that it tries again where the jaws took hold of nothing.
+    /// Number of further tries after jaws closed on nothing.
     pub retries: usize,
-    /// What follows the hold.
+    /// The actions after the hold.
     pub after: AfterHold,
 }
 

@@ -1,10 +1,10 @@
 //! The scripted finite-state baseline: grasp at the organ's middle, lift, bring the cutter to the
-//! tissue between grasp and base, open, engage, close. With a [`Script`] it lifts as far as it is
-//! asked to, where it is asked to, and lowers or cuts what it lifted.
+//! tissue between grasp and base, open, engage, close. With a [`Script`], place and height of the
+//! lift are those of the script, and afterwards it lowers or cuts the tissue.
 //!
-//! The jaws close as far as the tissue between them gives ([`Grip`]). Without a script they rise
-//! until the tissue has risen, and what they could not lift they lower, let go of and grasp again,
-//! farther from where the organ is held.
+//! The jaws close as far as the tissue between them allows ([`Grip`]). Without a script they rise
+//! until the tissue has risen. If it does not rise, they lower it, release it and grasp again,
+//! farther from the organ's attachment.
 //!
 //! It looks at where the tissue is, which no policy that is scored may. All it does goes through
 //! actions, and so through controllers, arms and ports where there are any.
@@ -28,7 +28,8 @@ const BACK: f64 = 0.025;
 /// Way along the shaft by which a cutter draws back after a cut (m).
 const WITHDRAWN: f64 = 0.060;
 
-/// How far the jaws rise with what a cut freed (m), and how long that takes and is kept (s).
+/// How far the jaws rise with a piece that was cut free (m), the time of that, and how long they
+/// stay there (s).
 const CARRY: f64 = 0.010;
 const CARRY_S: f64 = 1.0;
 const KEEP_S: f64 = 0.5;
@@ -45,14 +46,14 @@ const CUT_DEPTH: f64 = 0.0140;
 /// half of a cutter's, and as much between them as either jaw's aim may be off.
 const BESIDE: f64 = 0.0060;
 
-/// Lift of the jaws (m) above what the gate asks for.
+/// Lift of the jaws (m) above the gate's.
 const ABOVE_GATE: f64 = 0.0025;
 
-/// Rise of the tissue (m) above what the gate asks for, to which the jaws go on lifting.
+/// The jaws lift until the tissue has risen by the gate's lift and this (m).
 const ENOUGH_ABOVE: f64 = 0.0005;
 
-/// They go on in steps of this height (m) and time (s), up to this lift above the gate (m), as long
-/// as tissue follows this share of a step.
+/// They continue in steps of this height (m) and time (s), up to this lift above the gate (m),
+/// while tissue follows this share of a step.
 const RISE: f64 = 0.001;
 const RISE_S: f64 = 0.2;
 const MAX_ABOVE: f64 = 0.008;
@@ -75,8 +76,8 @@ const DRAG_S: f64 = 0.6;
 const OPEN_S: f64 = 0.5;
 const RELEASE_JAW: f64 = 0.6;
 
-/// Speed of the greedy one over that of the careful one, and the time that it gives jaws to close
-/// (s): what they take on nothing and a little more.
+/// Speed of the greedy style over that of the careful one, and the time it gives the jaws to close
+/// (s): a little more than they need on nothing.
 const HASTE: f64 = 3.0;
 const SNATCH_S: f64 = 0.4;
 
@@ -113,9 +114,9 @@ pub struct Scripted {
     /// Where each arm goes from and to in this phase.
     from: Vec<Setpoint>,
     to: Vec<Setpoint>,
-    /// What it asked of each arm last. Not what the cell was commanded: who changes its actions on
-    /// the way must not shift where its next phase begins, or a constant offset grows with every
-    /// phase.
+    /// The last setpoint that the policy commanded to each arm. Not what the cell was commanded:
+    /// who changes its actions on the way must not shift where its next phase begins, or a constant
+    /// offset grows with every phase.
     last: Vec<Setpoint>,
     /// The grasp, as it was aimed at.
     grasp: Option<Aim>,
@@ -331,7 +332,7 @@ impl Scripted {
         Ok((1.5 * way / speed).max(turn).max(0.3))
     }
 
-    /// What comes after the phase, looking at the episode as it is now.
+    /// Chooses the next phase by the present state of the episode.
     fn next(&mut self, episode: &Episode) {
         let (t, careful) = (seen(episode).task, self.style == Style::Careful);
         let tries = self.script.map_or(TRIES, |script| script.retries);
@@ -399,12 +400,12 @@ impl Scripted {
         self.feels() && seen(episode).task.grasped > 0.0 && self.done > 0
     }
 
-    /// Whether the jaws are closing on what they feel.
+    /// Whether the jaws are closing and respond to the tissue's force.
     fn feels(&self) -> bool {
         self.style == Style::Careful && self.phase == Phase::Close
     }
 
-    /// Whether the lift goes on: the tissue has risen by `least` (mm) and not yet enough.
+    /// Whether the lift continues: the tissue has risen by `least` (mm), and not yet enough.
     fn goes_on(&self, episode: &Episode, least: f64) -> bool {
         let (t, gate) = (seen(episode).task, episode.scene().task.gates.lift_mm);
         let wanted = t.lift_mm < gate + 1e3 * ENOUGH_ABOVE;
@@ -490,7 +491,7 @@ impl Policy for Scripted {
         }
         while chunk.len() < CHUNK {
             if self.count > 0 && self.done >= self.count {
-                // What comes next is decided by what is seen, so a chunk ends with its phase.
+                // The next phase depends on the observation, so a chunk ends with its phase.
                 if !chunk.is_empty() {
                     break;
                 }

@@ -1,4 +1,4 @@
-//! The baseline of a task of one's own: the steps of its `[[task.script]]`, one after the other.
+//! The baseline of a custom task: the steps of its `[[task.script]]`, one after another.
 //!
 //! Like the scripted controller it looks at where the tissue is, which no policy that is scored
 //! may, closes the jaws as far as the tissue gives ([`Grip`]), and all it does goes through
@@ -190,7 +190,7 @@ impl Steps {
     }
 
     /// Skips grasps of tissue that is held already. They occur after an arm that lost its tissue
-    /// has gone back to its own grasp.
+    /// has returned to its own grasp.
     fn skip_held(&mut self, episode: &Episode) -> Result<()> {
         while let Some(step) = self.script(episode) {
             let k = Self::arm(episode, step)?;
@@ -202,8 +202,7 @@ impl Steps {
         Ok(())
     }
 
-    /// The first arm that has lost what it took hold of and may try again, with the step that took
-    /// it.
+    /// The first arm that has lost its tissue and may try again, with the step that grasped it.
     fn lost(&self, episode: &Episode) -> Result<Option<(usize, usize)>> {
         for (k, held) in self.held.iter().enumerate() {
             let Some(at) = *held else { continue };
@@ -245,8 +244,8 @@ impl Steps {
             self.next(episode)?;
         }
         let step = self.script(episode);
-        // What ends a step, and what closing jaws feel, is looked at in every period; a motion goes
-        // on in chunks.
+        // The end of a step, and the force on closing jaws, are checked in every period. A motion
+        // continues in chunks.
         let closing = self.phase == Some(Phase::Close);
         let looks = closing || step.is_some_and(|s| s.until.is_some());
         if let (Some(step), true) = (step, closing) {
@@ -279,7 +278,7 @@ impl Steps {
     }
 }
 
-/// Whether the step's arm holds what it is to grasp.
+/// Whether the step's arm holds the tissue that it is to grasp.
 fn holds(episode: &Episode, step: &ScriptProgram) -> Result<bool> {
     let k = Steps::arm(episode, step)?;
     let ScriptAction::Grasp(part) = &step.action else { return Ok(false) };
@@ -287,8 +286,7 @@ fn holds(episode: &Episode, step: &ScriptProgram) -> Result<bool> {
     Ok(episode.cell().carried(k).is_some_and(|held| bodies.contains(&held.organ)))
 }
 
-/// The scripted baseline of any task: the steps of its script where it has one, and
-/// [`Scripted`] where it has none.
+/// The scripted baseline of any task: the steps of its script if it has one, else [`Scripted`].
 #[derive(Clone, Debug)]
 pub struct Baseline {
     scripted: Scripted,

@@ -17,9 +17,10 @@
 //! - pinned nodes stay; held nodes are prescribed. The stepper's rules for nodes that cannot follow
 //!   a tool are left out: a motion that cannot be followed is an error.
 //!
-//! Friction has no potential, because its limit grows with the depth, nor has the stiffness of an
-//! edge that touches a tool, which depends on where it touches. So the function is minimised with
-//! these held, which are then updated, until the forces of the true law are in balance.
+//! Two quantities have no potential: friction, because its limit grows with the depth, and the
+//! stiffness of an edge that touches a tool, because it depends on the place of the contact. So the
+//! function is minimised with both fixed. Then they are updated, until the forces of the true law
+//! are in balance.
 //!
 //! The minimum is that of the steps of `SolverSettings::PAPER`. The default solver steps a body in
 //! free flight exactly, the oracle by implicit Euler.

@@ -1,4 +1,4 @@
-//! Newton's method with a line search that lets no element lose its volume.
+//! Newton's method with a line search in which no element loses its volume.
 //!
 //! The exact Hessian is tried first, because it alone converges quadratically. Where it is not
 //! positive definite, the elements' tangents are projected (Teran and others, "Robust quasistatic
@@ -78,9 +78,9 @@ impl Solver {
         self.system.as_mut().ok_or(Failure::Singular)
     }
 
-    /// Moves fixed nodes of `x` to their targets, in parts where an element would lose its volume,
-    /// with the free nodes following. Free nodes continue with their velocities (`guess`: dt and
-    /// velocities) if they can. Returns the number of parts.
+    /// Moves fixed nodes of `x` to their targets while the free nodes follow. It moves them in
+    /// parts if an element would lose its volume. Free nodes continue with their velocities
+    /// (`guess`: dt and velocities) if they can. Returns the number of parts.
     pub fn move_fixed(
         &mut self,
         potential: &Potential<'_>,
@@ -170,8 +170,8 @@ impl Solver {
                 add(&mut next, share, &step);
                 let next_energy = potential.gradient(&next, &mut next_gradient);
                 let next_size = norm(&next_gradient, fixed);
-                // Near the minimum energies differ by less than their rounding; gradients still
-                // tell.
+                // Near the minimum, energies differ by less than their rounding. Gradients still
+                // decide.
                 let decreases = next_energy <= energy + ARMIJO * share * slope;
                 let nearer = (next_energy - energy).abs() <= rounding && next_size < size;
                 if next_size.is_finite() && next_energy.is_finite() && (decreases || nearer) {

@@ -1,5 +1,6 @@
 //! Friction limits, and the features of a surface that touch, have no potential. They stay fixed
-//! while a round minimises and are found again after it, until the forces of the true law balance.
+//! while a round minimises. Then they are searched again, until the forces of the true law are in
+//! balance.
 
 use super::newton::{Solver, norm};
 use super::potential::Potential;

@@ -37,7 +37,7 @@ pub struct OracleState {
 /// How far friction's springs at tools and between bodies are stretched, in the world (m).
 pub(crate) type Stretches = BTreeMap<TouchKey, DVec3>;
 
-/// What a node or feature touches.
+/// The object that a node or feature touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Touched {
     /// The model's collider of this number.

@@ -114,8 +114,7 @@ fn gradient_and_hessian_are_the_energys_derivatives() {
     }
 }
 
-/// Eigenvalues are seen through quadratic forms; nothing of a tangent is lost where all are
-/// positive.
+/// Quadratic forms show the eigenvalues. Where all are positive, a tangent loses nothing.
 #[test]
 fn projection_takes_the_negative_part_alone() {
     let twist = DMat3::from_cols(DVec3::new(0.7, 0.3, -0.1), DVec3::new(-0.2, 0.6, 0.2), DVec3::new(0.1, -0.3, 0.8));

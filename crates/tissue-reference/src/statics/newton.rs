@@ -36,7 +36,7 @@ pub struct Load {
     pub force: DVec3,
 }
 
-/// What acts on a body.
+/// The load on a body.
 #[derive(Clone, Debug, Default)]
 pub struct Loading {
     /// Force per volume (N/m3).

@@ -1,10 +1,11 @@
 //! Patches of neighbouring tetrahedra that share one deformation gradient.
 //!
-//! Linear tetrahedra are too stiff because each must keep its volume and its shape by itself. Here
-//! the resistance to a change of volume, and a share of that to a change of shape, act on the mean
-//! gradient of a patch; each element keeps the rest, so that nothing within a patch is limp. The
-//! mean over patches is that of de Souza Neto and others ("F-bar-based linear triangles and
-//! tetrahedra for finite strain analysis of nearly incompressible solids", 2005), as an energy.
+//! Linear tetrahedra are too stiff because each of them alone must keep its volume and its shape.
+//! Here the resistance to a change of volume, and a share of that to a change of shape, act on the
+//! mean gradient of a patch. Each element keeps the rest, which leaves no mode of a patch without
+//! stiffness. The mean over patches is that of de Souza Neto and others ("F-bar-based linear
+//! triangles and tetrahedra for finite strain analysis of nearly incompressible solids", 2005), as
+//! an energy.
 
 use super::elements::{Elements, Sample, linear_sample};
 use glam::DVec3;

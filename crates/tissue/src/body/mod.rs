@@ -1,9 +1,9 @@
 //! One deformable body, laid out for the sweeps.
 //!
 //! Vertices are renumbered by colour: those of one colour are a range, and pinned vertices, which
-//! have no colour, come last. Positions are kept relative to the body's own origin, so that the
-//! rounding of `f32` is far below the sags that are measured. What a vertex needs of its elements
-//! and edges is adjacent, in the order in which the sweeps read it.
+//! have no colour, come last. Positions are relative to the body's own origin, which keeps the
+//! rounding of `f32` far below the measured sags. The data that a vertex needs of its elements and
+//! edges are adjacent, in the order in which the sweeps read them.
 
 pub(crate) mod coloring;
 pub(crate) mod element_lanes;

@@ -93,8 +93,8 @@ impl<'a> Walk<'a> {
         self.push(c, true, Some(t));
     }
 
-    /// Follows neighbours until every triangle is in the strip. Of two, the one with fewer ways on
-    /// comes first, or it would be left alone.
+    /// Follows neighbours until every triangle is in the strip. Of two neighbours, the one with
+    /// fewer free neighbours comes first; otherwise it would be left alone.
     fn walk(&mut self) {
         let mut last = self.pushes.last().and_then(|push| push.triangle).map_or(0, |(t, _)| t as usize);
         while self.left != 0 {

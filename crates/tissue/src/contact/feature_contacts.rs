@@ -3,7 +3,7 @@
 //! Vertices alone leave gaps: a blade that is thinner than a triangle is wide passes between them.
 //! So the point of an edge or triangle that is nearest to the axis of a capsule touches it as well.
 //! Its stiffness is that of its vertices, and falls to 0 where the point reaches one of them, which
-//! touches by itself: the force does not jump where a blade slides from feature to feature.
+//! has its own contact: the force does not jump where a blade slides from feature to feature.
 //!
 //! The point stays where it is on its edge or triangle for a substep, and then follows the tissue
 //! halfway. Tissue that tilts moves the point to the side that rises, which pushes it back: a point
@@ -115,8 +115,8 @@ impl FeatureContacts {
     }
 
     /// Appends the contacts of a substep that begins with the vertices at `x`, which go by `way` if
-    /// their velocities stay (m). What no contact moves, because all its vertices are `fixed`, has
-    /// none.
+    /// their velocities stay (m). A contact whose vertices are all `fixed` is left out, because it
+    /// moves nothing.
     #[expect(clippy::too_many_arguments, reason = "what a substep begins with")]
     pub fn find(
         &mut self,

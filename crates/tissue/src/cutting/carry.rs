@@ -1,4 +1,5 @@
-//! What a cut body was, transferred to its pieces: masses, pins, motion, grasps, collision filters.
+//! Transfers the properties of a cut body to its pieces: masses, pins, motion, grasps, collision
+//! filters.
 
 use super::split::{Split, parts};
 use super::{Piece, Severed};

@@ -107,7 +107,7 @@ impl Cut {
 /// Supports stay. Nodes that stay whole keep their number as long as the body is one, and one copy
 /// of each node that fell apart has its number; the others come last.
 ///
-/// What falls off becomes a body of its own at the end of the model, named `appendix.1`,
+/// A piece that falls off becomes a body of its own at the end of the model, named `appendix.1`,
 /// `appendix.2`, ... The piece that is pinned by the most nodes, or else is the largest, remains
 /// the body. New bodies have contact with the bodies that the whole one had contact with, and with
 /// the other pieces if the whole had contact with itself. A body of loose parts keeps those that

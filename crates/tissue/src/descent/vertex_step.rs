@@ -2,7 +2,7 @@
 //!
 //! Chen, Liu, Yang and Yuksel, "Vertex block descent", SIGGRAPH 2024. Each vertex takes a Newton
 //! step on its own 3x3 block of 1/(2h^2) |x - y|_M^2 + E(x) with all others held. Along the step of
-//! one vertex the volume of each of its elements is linear: the step is cut so that none falls
+//! one vertex, the volume of each of its elements is linear. The step is cut before a volume falls
 //! below a floor, and no element is ever inverted.
 
 use super::kernel::{Local, Seen, VertexElasticity, volume_gradient};

@@ -1,5 +1,5 @@
-//! What presses, holds and pulls the vertices of an island in a substep, as terms of its potential
-//! in double precision.
+//! The forces that press, hold and pull the vertices of an island in a substep, as terms of its
+//! potential in double precision.
 
 use crate::Body;
 use crate::body::EmbeddingData;

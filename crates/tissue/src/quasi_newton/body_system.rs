@@ -45,12 +45,12 @@ pub(crate) struct QuasiNewtonSolver {
     pub(super) memory: Memory,
     /// Rigid motions, of a body that touches others and that nothing holds.
     pub(super) rigid: Option<RigidModes>,
-    /// What happened to the body in the substep.
+    /// The result of the substep for the body.
     pub(super) progress: Progress,
     /// Whether the body takes part in the search.
     pub(super) sleep: Sleep,
     pub(super) rest: RestCache,
-    /// What steps the body when the quasi-Newton steps fail.
+    /// The fallback solver, for when the quasi-Newton steps fail.
     pub(super) fallback: BodyDescent,
 }
 

@@ -3,8 +3,8 @@
 //!
 //! Tissue that a grasp pulls against its pins is squeezed flat beside it. The matrix has the
 //! stiffness at rest, and each such element is some fifty times as stiff along one direction: the
-//! gradient g of its volume ratio. What it has more is k g g', with k its volume times the increase
-//! of the energy's second derivative: one rank of the low-rank update an element.
+//! gradient g of its volume ratio. Its additional stiffness is k g g', with k its volume times the
+//! increase of the energy's second derivative: one rank of the low-rank update per element.
 
 use super::elements::Elements;
 use super::iterate::position;

@@ -2,8 +2,8 @@
 //!
 //! A solve reads the whole factor twice and does one multiplication a number: it is bound by
 //! memory. So the factor is kept in 16 bits a number, in tiles of 16 x 16 numbers with one scale
-//! each, supernode by supernode. The triangle on a supernode's diagonal is kept as its inverse, so
-//! that a solve consists of products with tiles and waits for no division.
+//! each, supernode by supernode. The triangle on a supernode's diagonal is kept as its inverse: a
+//! solve consists of products with tiles and waits for no division.
 //!
 //! The backward half is the exact transpose of the forward half, tile by tile. So rounding the
 //! factor to 16 bits leaves the preconditioner symmetric and positive definite.

@@ -9,10 +9,10 @@
 //! A u = B G t + M (2 u' - u'') / h^2 + D u' / h, with u' and u'' after the two substeps before.
 //!
 //! The body's factor solves for the lag of the nodes behind the tools, u - G t: it is what
-//! stretches the springs, and small. The factor has springs alike in all directions. What slips has
-//! none along the surface: the difference is left to conjugate gradients. The factor is that of the
-//! stiffness at rest, here turned as a whole: turned node by node, as the search has it, it would
-//! resist translations of tissue that is bent.
+//! stretches the springs, and small. The factor has springs alike in all directions. A sliding
+//! contact has none along the surface. Conjugate gradients account for the difference. The factor
+//! is that of the stiffness at rest, here turned as a whole: turned node by node, as the search has
+//! it, it would resist translations of tissue that is bent.
 
 use super::QuasiNewtonSolver;
 use super::iterate::{add, position};

@@ -1,8 +1,8 @@
 //! A height field that conforms to the underside of a body at rest.
 //!
-//! The surface is a biquadratic B-spline over a square grid. Its normal is continuous, so that a
-//! node that slides over it meets no edges. It lies nowhere above its coefficients, so that
-//! lowering them keeps it under every node of a body.
+//! The surface is a biquadratic B-spline over a square grid. Its normal is continuous: a node that
+//! slides over it meets no edges. It lies nowhere above its coefficients: if these are lowered, it
+//! stays under every node of a body.
 
 use super::SupportContact;
 use crate::{Error, Result};
@@ -149,8 +149,8 @@ impl SupportField {
         }
     }
 
-    /// Lowers the coefficients around each node that lies below the surface by its depth. What is
-    /// lowered for one node lowers the surface for the others.
+    /// Lowers the coefficients around each node that lies below the surface by its depth. Each
+    /// lowering also lowers the surface for the other nodes.
     fn lower(&mut self, mesh: &TetMesh) {
         for p in &mesh.vertices {
             let depth = -self.contact(*p).height;

@@ -1,6 +1,6 @@
-//! A viewer of an episode that a program of its own steps, as an environment of Gymnasium is: it is
-//! told of every step and shows it. Clients watch; nothing that they send reaches the episode, and
-//! the program waits for none of them.
+//! A viewer of an episode that another program steps, such as an environment of Gymnasium. That
+//! program reports every step, and the viewer shows it. Clients only watch: their messages never
+//! reach the episode, and the program waits for none of them.
 
 mod watchers;
 
@@ -44,11 +44,11 @@ struct Inner {
     known: Arc<Mutex<Known>>,
     answering: Option<JoinHandle<()>>,
     taker: Taker,
-    /// What is in pictures; the taker's meshes are of this scene.
+    /// The scene of the pictures, which is also that of the taker's meshes.
     drawn: Scene,
     readings: Readings,
     pictures: Pictures,
-    /// Events that were told.
+    /// Number of events reported so far.
     events: usize,
     /// When the last state was taken.
     taken: Instant,
@@ -89,8 +89,8 @@ impl Follower {
         Ok(Self { inner: Some(inner), process: std::process::id() })
     }
 
-    /// Shows `episode` after a step; `fresh` says that it was begun or restored, so that what came
-    /// before is not what was shown.
+    /// Shows `episode` after a step. `fresh` says that it was begun or restored: earlier states are
+    /// not part of what is shown.
     ///
     /// # Errors
     /// Shapes that cannot be read.
@@ -121,7 +121,7 @@ impl Drop for Follower {
     fn drop(&mut self) {
         let inner = self.inner.take();
         if self.process != std::process::id() {
-            // The threads belong to the parent. Waiting for them here would never end.
+            // The threads belong to the parent. A wait for them here would never end.
             std::mem::forget(inner);
         }
     }
@@ -203,7 +203,7 @@ impl Inner {
         header["time_s"] = json!(episode.time());
         let snapshot = self.taker.take(episode.cell(), self.hub.wants(), header, &self.readings)?;
         self.taken = Instant::now();
-        // Under the lock, so that no earlier one comes after it.
+        // Done under the lock, because no earlier snapshot may come after this one.
         let mut known = lock(&self.known);
         known.parked = None;
         if due || !watched {

@@ -1,5 +1,5 @@
-//! Answers those who watch an episode of another program, from what is known of it: the program may
-//! stand still for any time.
+//! Answers the clients that watch an episode of another program, from its last reported state: the
+//! program may pause for any time.
 
 use super::WATCHED;
 use crate::encode::Encoder;
@@ -36,12 +36,12 @@ pub(super) struct Asked {
     at: Instant,
 }
 
-/// What is known of the episode between its steps.
+/// The last reported state of the episode.
 pub(super) struct Known {
     /// The rows so far, and the names of their columns.
     rows: Vec<Channels>,
     pub names: Vec<String>,
-    /// The status, but for what changes with wall time.
+    /// The status, without the parts that change with wall time.
     status: Value,
     stepped: Option<Instant>,
     pace: Pace,

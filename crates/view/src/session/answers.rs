@@ -1,4 +1,4 @@
-//! What a session does for its clients.
+//! How a session carries out its clients' requests.
 
 use super::Session;
 use super::status::Telling;
@@ -84,7 +84,7 @@ impl Session {
         Ok(done)
     }
 
-    /// The client that drove an arm is gone.
+    /// The client that drove an arm has disconnected.
     fn lost(&mut self, arm: ArmName) {
         let had = self.show.live.as_ref().is_some_and(|l| l.operators.actor(arm).name() != "policy");
         if had {
@@ -159,7 +159,7 @@ impl Session {
                 return Err(Mistake("state", "nothing was done yet".to_owned()));
             }
             recorder.take(&self.hub, self.show.episode.time());
-            // What is kept ends at the head.
+            // A kept recording ends at the head.
             self.show.rewind(self.show.head()).map_err(internal)?;
             while self.show.in_review() {
                 let mut around = Around { hub: &self.hub, encoder: &self.encoder, pace: &mut self.pace };

@@ -1,5 +1,5 @@
-//! The simulation's thread: it plays an episode at a pace, does what clients ask, and tells how it
-//! stands. It never waits for a client.
+//! The simulation's thread: it plays an episode at a pace, carries out the requests of clients, and
+//! reports its status. It never waits for a client.
 
 mod answers;
 mod status;
@@ -27,7 +27,7 @@ const STATUS_EVERY: Duration = Duration::from_millis(500);
 /// Periods that are done without a look at the requests on the way to a time.
 const SEEK_PERIODS: usize = 4;
 
-/// What a session is made of.
+/// The parts of a session.
 pub(crate) struct Plan {
     pub source: Source,
     pub building: Building,
@@ -71,7 +71,7 @@ pub(crate) struct Session {
 /// Builds and runs a session until `stop` is set. Tells the clients of an error and returns it.
 ///
 /// # Errors
-/// What is shown cannot be built.
+/// The source cannot be built.
 pub(crate) fn run(hub: &Arc<Hub>, plan: Plan, stop: &Arc<AtomicBool>, periods: Arc<AtomicU64>) -> Result<()> {
     let ran = Session::build(hub, plan, stop, periods).and_then(|mut session| session.run());
     if let Err(why) = &ran {
@@ -157,7 +157,7 @@ impl Session {
         Ok(())
     }
 
-    /// Does a period, and tells what happened.
+    /// Runs a period, and reports its events.
     fn period(&mut self) -> Result<()> {
         if let Some(recorder) = &mut self.recorder {
             recorder.take(&self.hub, self.show.episode.time());

@@ -1,4 +1,4 @@
-//! What a session tells all clients of how it stands.
+//! The status messages of a session to all clients.
 
 use super::Session;
 use crate::hub::Hub;

@@ -25,7 +25,7 @@ pub(super) struct Material {
     pub metallic: f32,
 }
 
-/// What an animation changes of a node.
+/// The property of a node that an animation changes.
 pub(super) enum Track<'a> {
     /// Its pose at each time.
     Poses(&'a [Pose]),

@@ -1,8 +1,8 @@
-//! An episode as a glTF file: what other programs show without a reader of ours.
+//! An episode as a glTF file, which other programs show without a reader of ours.
 //!
-//! The cell's bodies are nodes with animated poses. Organs deform by morph targets, one a keyframe,
-//! each at weight 1 at its time and 0 at the others, so that a viewer blends two neighbours. A cut
-//! gives an organ another surface: that is a mesh of its own, which is shown (scale 1) from the
+//! The cell's bodies are nodes with animated poses. Organs deform by morph targets, one per
+//! keyframe, each at weight 1 at its time and 0 at the others: a viewer blends two neighbours. A
+//! cut gives an organ another surface: that is a mesh of its own, which is shown (scale 1) from the
 //! keyframe after the cut on, and hidden (scale 0) before.
 
 mod document;
@@ -24,7 +24,7 @@ pub const MAX_KEYFRAMES: usize = 64;
 /// Vertices that move less than this (m) do not move: the grid of recorded surfaces is as fine.
 const STILL: f64 = 1e-5;
 
-/// What was written.
+/// Summary of the written file.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct GltfSummary {
     /// Number of keyframes.

@@ -132,7 +132,7 @@ pub(super) fn images(r: &Reconstruction) -> Result<String> {
 
 fn depth_figure(r: &Reconstruction) -> Result<String> {
     let valid: Vec<f64> = r.composite.depth.depth.iter().filter(|d| **d > 0.0).map(|d| f64::from(*d)).collect();
-    // The ends are percentiles, so that stray depths do not stretch the colour scale.
+    // The ends are percentiles: stray depths must not stretch the colour scale.
     let low = quantile(&valid, 0.005).unwrap_or(0.0);
     let high = quantile(&valid, 0.995).unwrap_or(1.0);
     let bar = page::scale_bar(&SEQUENTIAL, &fixed(1e3 * low, 0), "depth (mm)", &fixed(1e3 * high, 0));

@@ -43,7 +43,7 @@ pub(super) fn sections(lifted: &FinishedLift) -> Result<(String, String)> {
 fn cards(lifted: &FinishedLift) -> String {
     let (r, s) = (&lifted.result, &lifted.recording.summary);
     let (d, mm) = (&s.details, |v: f64| format!("{} mm", fixed(v, 2)));
-    // What was not measured is shown as a dash.
+    // A value that was not measured is shown as a dash.
     let of_grasp = |v: Option<f64>| v.unwrap_or(f64::NAN);
     let grasp = s.grasp_at.map_or("no grasp".to_owned(), |at| {
         format!(

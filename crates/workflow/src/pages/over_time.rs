@@ -56,7 +56,7 @@ pub(super) fn inverted_card(s: &Summary) -> Card {
     Card::new("Inverted elements", s.inverted_peak.to_string(), "maximum of any frame").met(s.inverted_peak == 0)
 }
 
-/// The card with what was beyond what tissue bears.
+/// The card with the warnings about tissue beyond its limits.
 pub(super) fn warnings_card(s: &Summary) -> Card {
     let note = s.warnings.described().unwrap_or_else(|| "nothing was beyond what tissue bears".to_owned());
     Card::new("Warnings", s.warnings.total().to_string(), note).met(s.warnings.is_empty())

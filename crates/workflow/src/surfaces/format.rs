@@ -41,7 +41,7 @@ const FRAME: u8 = 2;
 /// Numbers of a pose.
 const POSE: usize = 7;
 
-/// What stands in the first line.
+/// The content of the first line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SurfacesHeader {
     /// Version of the program.
@@ -54,7 +54,7 @@ pub struct SurfacesHeader {
     pub period_s: f64,
     /// Frames: one more than steps.
     pub frames: usize,
-    /// What the task asks for, in words.
+    /// The task's instruction, in words.
     pub prompt: String,
     /// Number of the task's stages.
     pub stages: usize,
@@ -122,7 +122,7 @@ pub struct SurfaceFrame {
     pub time_s: f64,
     /// How far the task is, from 0 to 1.
     pub score: f64,
-    /// What a policy observes.
+    /// The observation of a policy.
     pub state: Vec<f32>,
     /// The arms.
     pub arms: Vec<ArmPosture>,

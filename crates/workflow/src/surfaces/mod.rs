@@ -1,7 +1,7 @@
-//! What an episode looked like, kept beside its actions: the organs' surfaces, the poses of arms,
-//! instruments and cameras, and what a policy observed, at the start and after every control
-//! period. Pictures are made of it without simulation, so that they do not depend on physics that
-//! may have changed since.
+//! The appearance of an episode, kept beside its actions: the organs' surfaces, the poses of arms,
+//! instruments and cameras, and a policy's observation, at the start and after every control
+//! period. Pictures are made of it without simulation, and do not depend on later changes of the
+//! physics.
 
 mod format;
 mod playback;

@@ -14,11 +14,11 @@ use trocar_sensors::{ArmPosture, CameraRig, DrawnCell};
 use trocar_specimen::Specimen;
 use trocar_task::{EPISODE_FILE, EpisodeFile, specimen_hash};
 
-/// An episode as it was recorded: actions, and what was seen at the start and after every step.
+/// A recorded episode: its actions, and its appearance at the start and after every step.
 pub struct RecordedEpisode {
     /// Its actions.
     pub file: EpisodeFile,
-    /// What is different from when it was recorded, in a sentence.
+    /// The difference from the time of recording, in a sentence.
     pub note: Option<String>,
     path: PathBuf,
     scene: Scene,
@@ -70,7 +70,7 @@ impl RecordedEpisode {
         let now = frames.next().map_err(wrong)?.unwrap_or_default();
         let drawn = file.drawn()?;
         let mut scene = written.with_drawn(&drawn, &specimen);
-        // Another specimen would move what is placed beside it.
+        // With another specimen, objects that are placed beside it would move.
         for camera in &mut scene.cameras {
             if let Some(recorded) = frames.header.cameras.iter().find(|c| c.name == camera.name) {
                 let SceneFrame { position_m, rotation_wxyz } = SceneFrame::of(&recorded.pose);
@@ -101,7 +101,7 @@ impl RecordedEpisode {
         self
     }
 
-    /// What is known of the recording.
+    /// The header of the recording.
     pub fn header(&self) -> &SurfacesHeader {
         &self.frames.header
     }

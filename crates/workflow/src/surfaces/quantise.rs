@@ -97,7 +97,7 @@ mod tests {
             read_differences(&bytes, &mut read);
             assert_eq!(read, now);
         }
-        // What rests is zeros; what moves little has no high bytes.
+        // A body at rest gives zeros, and small motions give zero high bytes.
         let mut bytes = Vec::new();
         write_differences(&[[65534, 1, 0], [0, 0, 0]], &mut before, &mut bytes);
         assert_eq!(bytes, [1, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);

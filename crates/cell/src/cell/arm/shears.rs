@@ -6,10 +6,10 @@ use crate::bite::Bite;
 use crate::section::{chords, slit};
 use crate::{Gripper, JawRegion, World};
 
-/// What a cutter has done in a frame of tissue.
+/// The work of a cutter in one tissue frame.
 #[derive(Clone, Debug)]
 pub(in crate::cell) struct Sheared {
-    /// The cutter as wide as it was open.
+    /// The cutter with the blades at their open angle.
     pub open: Gripper,
     /// The part of the blades along which tissue is cut: distances from the pivot (m).
     pub part: [f64; 2],
@@ -20,12 +20,12 @@ pub(in crate::cell) struct Sheared {
 }
 
 impl ArmUnit {
-    /// Blades that were open with tissue between them and close through it cut it, as far as their
-    /// edges come.
+    /// Cuts tissue with blades that were open around it and now close. The cut reaches as far as
+    /// the edges have come.
     ///
     /// Edges that pass each other shear tissue instead of pressing it flat. So the contact of
     /// closing blades is off until no tissue is left where the open blades were and the blades are
-    /// out of all organs. The shaft's contact stays, and what the cut takes is felt by the jaws.
+    /// out of all organs. The shaft's contact stays, and the jaws feel the force of the cut.
     pub fn cut(&mut self, world: &World) -> Option<Sheared> {
         let length = self.model.blades.length;
         let between = |open: &Gripper| JawRegion::sized(open, length).fullest(world).map(|(organ, _)| organ);
@@ -58,10 +58,11 @@ impl ArmUnit {
                 state.gripper.jaw_angle,
             );
         }
-        // Below the gate an event follows when what was left is cut, too.
+        // Below the gate, an event also follows when the rest is cut.
         let rest = state.scissors.opened().is_none() && bite.is_through();
         let told = (closed || ends || rest) && bite.has_news();
-        // Through is through: what lies at the rims is thinner than the edges are apart.
+        // A cut that is through spans the whole blades: tissue at the rims is thinner than the gap
+        // between the edges.
         let part = if bite.is_through() { Some([f64::NEG_INFINITY, f64::INFINITY]) } else { bite.part() };
         if told {
             bite.told = bite.area();

@@ -137,8 +137,8 @@ impl ArmState {
         }
     }
 
-    /// Every number of the state, for its hash. It destructures every field, so that a forgotten
-    /// one does not compile.
+    /// Every number of the state, for its hash. It destructures every field: a forgotten field does
+    /// not compile.
     pub fn numbers(&self) -> Vec<f64> {
         let Self {
             wanted,
@@ -191,8 +191,8 @@ impl ArmState {
             all.extend([*organ as f64, *s, *opening]);
             all.extend(hold.numbers());
         }
-        // Only where there is something: hashes in episodes that were recorded before it was there
-        // stay valid.
+        // Added only if it is not empty: hashes of episodes that were recorded before this field
+        // existed stay valid.
         if *standing > 0 {
             all.push(f64::from(*standing));
         }

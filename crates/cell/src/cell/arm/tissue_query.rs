@@ -58,8 +58,9 @@ impl ArmUnit {
         [(self.model.tools.gripper, gripper.pose), one, two]
     }
 
-    /// The organs that a part of the instrument is inside of, except what the jaws hold and the
-    /// blades shear, and those in a hole of which it is; each with a place there (m).
+    /// The organs that contain a part of the instrument, each with a place inside (m). Tissue that
+    /// the jaws hold or the blades shear does not count, and neither do organs that the instrument
+    /// has punctured.
     pub fn pierces(&self, world: &World) -> Vec<(usize, DVec3)> {
         let felt = if self.state.shears.is_some() { 1 } else { 3 };
         let mut organs = self.inside_organs(world, felt);

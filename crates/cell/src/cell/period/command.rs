@@ -11,7 +11,7 @@ use crate::cell::setpoint::NUMBERS;
 use crate::{Error, Result};
 
 impl Cell {
-    /// Takes an action in; one with an error changes nothing.
+    /// Accepts an action. An action with an error changes nothing.
     pub(super) fn take(&mut self, action: Option<&Action>) -> Result<()> {
         if let Some(action) = action {
             self.check(action)?;

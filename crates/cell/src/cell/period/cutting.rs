@@ -1,4 +1,5 @@
-//! Cuts that blades make in a frame: the tissue parts as far as they have come, and events tell.
+//! Cuts by blades within a frame: the tissue parts as far as the blades have come, and events
+//! report it.
 
 use crate::Result;
 use crate::cell::Cell;
@@ -9,12 +10,12 @@ use crate::gripper::JAW_REGION_BEGIN;
 use crate::severance::{Parting, Severance};
 use glam::DVec3;
 
-/// Tissue parts when the cut is longer by this (m) than when it parted last: two rows of elements
-/// of an appendix. The solver is set up anew each time.
+/// Tissue parts each time the cut is longer by this (m) than at the last parting: two rows of
+/// elements of an appendix. Each parting sets up the solver again.
 const ADVANCE: f64 = 0.003;
 
 impl Cell {
-    /// Takes over what the cutter of arm `k` has done.
+    /// Applies the cut that the cutter of arm `k` has made in the frame.
     pub(super) fn cut(&mut self, k: usize, sheared: &Sheared, events: &mut Vec<CellEvent>) -> Result<()> {
         let Some(bite) = &self.arms[k].state.bite else { return Ok(()) };
         let (organ, work_mj, force_peak_n) = (bite.organ, 1e3 * bite.work, bite.force_peak);
@@ -22,7 +23,7 @@ impl Cell {
             self.part(k, organ, sheared)?;
         }
         let arm = &mut self.arms[k];
-        // What is cut between the last faces of elements parts nothing more.
+        // A cut that separates no further faces of elements is not reported again.
         let parts = arm.state.parting.as_ref().is_none_or(|p| p.told != Some(p.figures.faces));
         if sheared.told && parts {
             let closed_rad = arm.state.gripper.jaw_angle;

@@ -19,8 +19,8 @@ impl Cell {
 }
 
 impl ArmUnit {
-    /// Takes the forces of the frame of `steps` physics steps, and lets the jaws grasp and release.
-    /// Returns what a cutter has done.
+    /// Applies the forces of the frame of `steps` physics steps, and lets the jaws grasp and
+    /// release. Returns the work of a cutter.
     fn take_forces(&mut self, world: &mut World, steps: u32, events: &mut Vec<CellEvent>) -> Option<Sheared> {
         let Self { model, state, .. } = self;
         state.forces = model.tools.forces(world.forces());

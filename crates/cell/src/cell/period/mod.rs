@@ -28,14 +28,14 @@ impl Cell {
     /// their last request.
     ///
     /// # Errors
-    /// An action with an error is refused with the number's index and name; nothing has changed
-    /// then. If the numbers of an arm are no longer finite, a state has to be restored.
+    /// An action with an error is refused with the number's index and name, and nothing changes. If
+    /// an arm's numbers are no longer finite, restore a state.
     pub fn step<'a>(&mut self, action: impl Into<Option<&'a Action>>) -> Result<CellReport> {
         self.step_watched(action, &mut |_| {})
     }
 
-    /// The same with a `watch` that sees the cell after each tissue frame. What it does must not
-    /// change the steps that follow.
+    /// The same with a `watch` that sees the cell after each tissue frame. The `watch` must not
+    /// change the following steps.
     ///
     /// # Errors
     /// As [`step`](Self::step).

@@ -34,7 +34,7 @@ impl ArmUnit {
         let Self { drive, state, .. } = self;
         let load = |tip: &Pose| {
             let tissue = state.exchange.load(tip.translation);
-            // Not added as a zero, which would change the sign of another.
+            // It is not added as a zero, because that would change the sign of a negative zero.
             if pushed == Wrench::default() { tissue } else { tissue + pushed }
         };
         let moved = drive.step(load, obstacles, dt)?;

@@ -59,8 +59,7 @@ impl ArmUnit {
         }
     }
 
-    /// Force with which tissue pushes the blades apart (N): what presses on them, and what they
-    /// cut.
+    /// Force with which tissue pushes the blades apart (N): from contact and from cutting.
     pub fn opening_force(&self) -> f64 {
         let state = &self.state;
         let cut = state.bite.as_ref().map_or(0.0, |bite| bite.force);

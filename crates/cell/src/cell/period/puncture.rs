@@ -1,9 +1,9 @@
 //! Stage 5: tissue on which an instrument presses hard enough is punctured.
 //!
-//! An instrument whose axis comes inside an organ has punctured it if it pressed on it with at least
-//! the scene's `safety.puncture_force_n`. The organ then has a hole around the part of
-//! the axis inside it, which becomes larger as the instrument goes on, and which lets this instrument
-//! through. Everywhere else they touch as before. When the instrument is out, the hole is gone.
+//! An instrument whose axis comes inside an organ has punctured it if it pressed on it with at
+//! least the scene's `safety.puncture_force_n`. The organ then has a hole around the part of the
+//! axis inside it. The hole grows as the instrument advances, and it lets this instrument through.
+//! Everywhere else they touch as before. When the instrument is out, the hole closes.
 
 use crate::World;
 use crate::cell::Cell;
@@ -14,8 +14,8 @@ use crate::cell::solid::Rod;
 use glam::DVec3;
 use trocar_tissue::Hole;
 
-/// A hole reaches so far beyond the surface of the instrument (m): farther than an instrument moves
-/// in a frame, and than triangles are wide.
+/// A hole reaches this far beyond the surface of the instrument (m): farther than an instrument
+/// moves in a frame, and farther than triangles are wide.
 const MARGIN: f64 = 4e-3;
 
 impl Cell {
@@ -52,8 +52,9 @@ impl ArmUnit {
     }
 }
 
-/// Widens the holes in which the instrument of `arm` is, and closes those that it has left: no axis
-/// is inside the organ, and no node of the hole would touch it. So contact begins without a jump.
+/// Widens the holes around the instrument of `arm`. Closes a hole that the instrument has left: no
+/// axis is inside the organ, and no node of the hole would touch the instrument. So contact begins
+/// without a jump.
 fn follow(world: &mut World, arm: &ArmUnit) {
     let mut holes = std::mem::take(&mut world.state.holes);
     holes.retain_mut(|hole| {

@@ -1,4 +1,5 @@
-//! Stage 7: the force guard sees the load of the frame, and stops an arm that would pass its limit.
+//! Stage 7: the force guard reads the load of the frame, and stops an arm that would exceed its
+//! limit.
 
 use crate::World;
 use crate::cell::Cell;

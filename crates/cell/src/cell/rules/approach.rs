@@ -9,7 +9,7 @@ use crate::{FRAME, World};
 use glam::DVec3;
 use trocar_tissue::Hole;
 
-/// The instrument is looked for where it would be after so many tissue frames.
+/// Numbers of tissue frames ahead at which the instrument's place is checked.
 const FRAMES_AHEAD: [f64; 2] = [1.0, 2.0];
 
 /// The direction from which the instrument of `arm`, which moves by `way` in a frame (m), is about

@@ -1,4 +1,4 @@
-//! Warns of an organ that stays strained without an instrument at it.
+//! Warns of an organ that stays strained with no instrument near it.
 //!
 //! Tissue that snaps back may stay folded: elements that would have to invert to unfold block each
 //! other.
@@ -8,7 +8,7 @@ use super::strain::{MAX_FRAMES_ALONE, Strain};
 use crate::cell::report::{CellEvent, PeriodLog};
 use trocar_scene::Side;
 
-/// Counts `organ` once if it stays strained with no `arm` at it.
+/// Counts `organ` once if it stays strained with no `arm` near it.
 pub(super) fn warn(arm: Option<Side>, strain: &Strain, organ: &str, watch: &mut OrganWatch, log: &mut PeriodLog) {
     if arm.is_some() || !strain.lasts() {
         watch.frames_alone = 0;

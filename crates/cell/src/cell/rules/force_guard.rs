@@ -1,5 +1,5 @@
-//! Rule: no arm presses an instrument harder into tissue than the scene's force limit, nor strains
-//! tissue to what the other rules would release.
+//! Rule: no arm presses an instrument into tissue with more than the scene's force limit, and none
+//! strains tissue beyond the limits that the other rules warn of.
 //!
 //! Controllers of real arms stop where the contact force is beyond a threshold; an FR3's is 20 N
 //! for a tip in the open ("collision behaviour" in Franka's control interface). In tissue a stop is
@@ -13,8 +13,8 @@
 //!   stops at once, and so does one that is about to hit tissue fast ([`super::approach`]). A
 //!   reference that stands or retreats is not stopped: a stop would undo the retreat.
 //!
-//! The stiffness seen so far tells how far a step may go, as in [`crate::Jaw`]: a fixed gain would
-//! oscillate on stiff tissue or be slow on soft tissue.
+//! The stiffness seen so far limits each step, as in [`crate::Jaw`]: a fixed gain would oscillate
+//! on stiff tissue or be slow on soft tissue.
 //!
 //! The load is the force on the instrument and the torque about its shaft, as a force at a lever: an
 //! open jaw that rolls into tissue presses on it as one that is pushed does. So loads and motions
@@ -57,14 +57,14 @@ const LEAST_MOTION: f64 = 2e-5;
 /// Stiffness of solids (N/m), and the maximum that is assumed when the instrument retracts.
 const SOLID_STIFFNESS: f64 = 1e4;
 
-/// Largest speed against a load (m/s). What is hit faster may be crushed before its force is seen.
+/// Largest speed against a load (m/s). A faster hit may crush tissue before its force is seen.
 pub(super) const FASTEST_TOUCH: f64 = 0.08;
 
 /// Maximum retraction (m per period).
 const RETREAT: f64 = 1e-3;
 
-/// Tissue frames that an arm goes on at its speed before a stop has its effect: one until the next
-/// chance to stop it, and one for its tracking error.
+/// Number of tissue frames for which an arm keeps its speed before a stop has its effect: one until
+/// the next chance to stop it, and one for its tracking error.
 const STOPPING_FRAMES: f64 = 2.0;
 
 /// The same for the strain of tissue, which speeds up where tissue is pressed on something hard.
@@ -85,9 +85,10 @@ pub(crate) struct ForceGuard {
     rise: f64,
     /// The tissue at the instrument then.
     tissue: TissueAtArm,
-    /// Whether tissue soon is beyond the guard's limits if the motion goes on.
+    /// Whether the tissue will soon be beyond the guard's limits if the motion continues.
     strained: bool,
-    /// Against what the instrument is about to hit too fast: a unit vector, or zero.
+    /// Direction against the instrument if it is about to hit tissue too fast: a unit vector, or
+    /// zero.
     hit: DVec3,
     /// Whether the force is beyond the limit and that was reported.
     reported: bool,
@@ -182,8 +183,8 @@ impl ForceGuard {
         self.strained
     }
 
-    /// Whether the arm has to stop at once, because it goes against a load that would otherwise
-    /// pass `limit` (N).
+    /// Whether the arm has to stop at once: it moves against a load that would otherwise exceed
+    /// `limit` (N).
     pub fn must_stop(&self, limit: f64) -> bool {
         if !limit.is_finite() {
             return false;
@@ -202,7 +203,7 @@ impl ForceGuard {
         self.hit != DVec3::ZERO || passes || against[1] > LEAST_MOTION && goes_on
     }
 
-    /// Whether the `force` (N) has just gone beyond `limit` (N).
+    /// Whether the `force` (N) has just exceeded `limit` (N).
     pub fn newly_exceeded(&mut self, force: f64, limit: f64) -> Option<f64> {
         // Reported once, until the force is well below the limit.
         let over = force > if self.reported { 0.8 * limit } else { limit };

@@ -1,4 +1,4 @@
-//! Safety: what stops the arms, and what warns of tissue beyond what tissue bears.
+//! Safety: rules that stop the arms, and rules that warn of tissue beyond its limits.
 //!
 //! | module | when | what it does |
 //! |---|---|---|

@@ -1,9 +1,9 @@
-//! Warns of tissue that an instrument strains beyond what tissue bears.
+//! Warns of tissue that an instrument strains beyond its limits.
 //!
 //! Real tissue tears at a stretch of about two; the model does not. Where an edge of an organ is
 //! longer than [`MAX_STRETCH`] times its rest length, or an element has less than
 //! [`MIN_VOLUME_SHARE`] of its rest volume, with an instrument near, it is counted once until the
-//! organ has recovered. What follows is motion of a model that real tissue would not survive.
+//! organ has recovered. The motion that follows is the model's; real tissue would not survive it.
 //!
 //! [`MAX_STRETCH`]: super::strain::MAX_STRETCH
 //! [`MIN_VOLUME_SHARE`]: super::strain::MIN_VOLUME_SHARE

@@ -1,8 +1,9 @@
 //! Warns of an instrument that has pierced an organ: the axis of one of its convex parts is inside.
 //!
 //! Contact keeps tissue outside of an instrument's axis, and an instrument that presses harder than
-//! tissue bears punctures it. What comes in with less force did so because the mesh or the contact
-//! gave way. Held tissue may bulge round the jaws and does not count, nor does what blades shear.
+//! tissue bears punctures it. An axis that comes in with less force did so because the mesh or the
+//! contact yielded. Held tissue may bulge around the jaws and does not count. Sheared tissue does
+//! not count either.
 
 use crate::World;
 use crate::cell::arm::ArmUnit;

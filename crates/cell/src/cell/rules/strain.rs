@@ -23,8 +23,8 @@ const MEASURED_BELOW: f64 = 0.4;
 /// volume.
 pub(super) const SQUEEZED: f64 = 0.2;
 
-/// Number of frames for which an organ may stay strained after the last instrument has left it:
-/// elastic tissue has recovered by then.
+/// Number of frames for which an organ may stay strained after the last instrument has left it.
+/// Elastic tissue recovers within this time.
 pub(super) const MAX_FRAMES_ALONE: u32 = 15;
 
 /// The worst strain of an organ.
@@ -71,8 +71,8 @@ fn most_crushed(tets: &[[u32; 4]], rest: &[f64], now: &[DVec3]) -> (f64, DVec3) 
     (least.0, least.1.map_or(DVec3::ZERO, |tet| tet.iter().map(|i| 0.25 * now[*i as usize]).sum()))
 }
 
-/// What bodies are like at rest: their edges with squared lengths (m2), and six times the volumes
-/// of their elements (m3).
+/// Bodies at rest: their edges with squared lengths (m2), and six times the volumes of their
+/// elements (m3).
 struct Rest {
     edges: Vec<([u32; 2], f64)>,
     volumes: Vec<f64>,

@@ -55,8 +55,9 @@ impl TissueAtArm {
         (self.stretch / MAX_STRETCH).max(crushed).powi(2)
     }
 
-    /// Whether it is beyond a limit in `frames` frames if it goes on as since `last`, a frame ago,
-    /// or if the instrument goes on against it by `way` (m) a frame.
+    /// Whether it exceeds a limit within `frames` frames: if its strain continues to change as
+    /// since `last`, a frame ago, or if the instrument continues to press on it by `way` (m) a
+    /// frame.
     pub fn will_exceed(&self, last: &Self, way: f64, frames: f64) -> bool {
         self.stretch + frames * (self.stretch - last.stretch) > MAX_STRETCH
             || self.volume + frames * (self.volume - last.volume) < MIN_VOLUME

@@ -1,4 +1,4 @@
-//! Stage 6: looks at the tissue after a frame: warns, and tells the force guard.
+//! Stage 6: looks at the tissue after a frame, warns, and informs the force guard.
 
 use super::strain::SQUEEZED;
 use super::tissue_at_arm::TissueAtArm;
@@ -7,10 +7,10 @@ use crate::cell::Cell;
 use crate::cell::arm::ArmUnit;
 use crate::cell::report::PeriodLog;
 
-/// What is known of an organ from the frames before.
+/// The strain record of an organ over earlier frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(in crate::cell) struct OrganWatch {
-    /// It was strained beyond what tissue bears, and has not recovered.
+    /// It was strained beyond its limits and has not recovered.
     pub overstretched: bool,
     /// Frames for which it has been strained without an instrument at it.
     pub frames_alone: u32,

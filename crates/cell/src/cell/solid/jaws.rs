@@ -2,8 +2,8 @@
 //! force, or, when they close, with the scene's force limit, as ideal arms move. Another instrument
 //! yields instead: it is pushed away.
 //!
-//! Blades turn once a frame of tissue, by up to 1.4 mm at their tips, nearly their radius. Springs
-//! in the arms' steps would come too late for that.
+//! Blades turn once a tissue frame, by up to 1.4 mm at their tips, which is nearly their radius.
+//! Springs in the arms' steps would act too late.
 
 use super::Solids;
 use super::meeting::Meeting;
@@ -16,14 +16,14 @@ use glam::DVec3;
 /// Bisections of the turn of jaws that solids stop.
 const BISECTIONS: usize = 8;
 
-/// A turn is checked in steps of at most this angle (rad): 0.7 mm at a blade's tip, so that no
+/// A turn is checked in steps of at most this angle (rad), which is 0.7 mm at a blade's tip. So no
 /// blade jumps over a solid.
 const MAX_TURN: f64 = 0.035;
 
 impl Solids {
-    /// The angle to which the jaws of `arm` turn in this frame on their way to `wanted` (rad):
-    /// less far if solids would push back with more than that force, and with more than where the
-    /// jaws are.
+    /// The angle to which the jaws of `arm` turn in this frame towards `wanted` (rad). They stop
+    /// where solids would push back with more than the jaws' force and with more than at the
+    /// present angle.
     pub fn turn_jaws(&self, arm: &ArmUnit, wanted: f64) -> f64 {
         let angle = arm.state.gripper.jaw_angle;
         if wanted == angle {
@@ -56,8 +56,8 @@ impl Solids {
     }
 
     /// Whether the axis of a blade of `arm` goes through pinned tissue with the jaws at `angle`
-    /// (rad). What has crossed a surface is not pushed back by it. Blades that shear go through
-    /// tissue.
+    /// (rad). A surface does not push back an axis that has crossed it. Blades that shear go
+    /// through tissue.
     fn blades_cross(&self, arm: &ArmUnit, angle: f64) -> bool {
         if arm.state.shears.is_some() {
             return false;

@@ -44,8 +44,8 @@ impl SolidLoad {
         self.mean
     }
 
-    /// Every number of it, none where there is no force: hashes of states in which nothing touches
-    /// are those of earlier versions.
+    /// All its numbers; none if there is no force. So hashes of states without touching solids
+    /// equal those of earlier versions.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
         let Self { mean, sum, peak } = *self;
         let any = mean != Wrench::default() || sum != Wrench::default() || peak != 0.0;

@@ -1,11 +1,10 @@
 //! Solids: instruments push each other, the bed and tissue that cannot move.
 //!
 //! An instrument is its shaft and two blades, all of capsules ([`rod`]). Where they touch a solid,
-//! a one-sided spring without friction pushes ([`spring`]), in every physics step of the arms. What
-//! may touch is found anew at the beginning of each step ([`meeting`]); there is no memory of
-//! earlier contacts. An arm with dynamics has the spring in its implicit step, so that no stiffness
-//! is too high; an ideal arm stops where the solids push it with the scene's force limit
-//! ([`step`]).
+//! a one-sided spring without friction pushes ([`spring`]), in every physics step of the arms. Each
+//! step begins with a new search for possible contacts ([`meeting`]). There is no memory of earlier
+//! contacts. An arm with dynamics has the spring in its implicit step, so no stiffness is too high.
+//! An ideal arm stops where the solids push it with the scene's force limit ([`step`]).
 //!
 //! Tissue that moves is not a solid: its own step finds its contacts. That step knows no contact of
 //! vertices that are pinned, so triangles of three pinned vertices are solids ([`pinned`]), and all
@@ -28,7 +27,7 @@ pub(super) use meeting::Meeting;
 pub(super) use pinned::PinnedSurface;
 pub(super) use rod::{Rod, clearance};
 
-/// What solids there are beside the instruments.
+/// The solids other than the instruments.
 pub(super) struct Solids {
     /// Height of the bed's plane (m), if there is a bed.
     pub bed: Option<f64>,

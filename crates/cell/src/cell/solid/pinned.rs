@@ -3,8 +3,8 @@
 //! The tissue's own step finds contacts of vertices that move. It has none for pinned vertices, so
 //! such a triangle would let an instrument pass. Here it is a solid for the instrument's axis on
 //! its outer side, with no margin: an instrument that lies beside it is not touched. Triangles with
-//! a vertex that moves belong to the tissue's contact, so no force counts twice. What lies at the
-//! rim of the pinned part and not in front of it is left to them as well.
+//! a vertex that moves belong to the tissue's contact, so no force counts twice. Tissue at the rim
+//! of the pinned part, and not in front of it, is also left to the tissue's contact.
 
 use super::meeting::{Deepest, Meeting, REACH};
 use super::rod::Rod;
@@ -42,7 +42,7 @@ struct Pinned {
 }
 
 impl Pinned {
-    /// Whether it is in one of the `holes`, and lets `tool` through.
+    /// Whether it is in one of the `holes` that let `tool` through.
     fn lets_through(&self, holes: &[Hole], tool: usize) -> bool {
         let open = |hole: &Hole| self.nodes.iter().any(|node| hole.nodes.binary_search(node).is_ok());
         holes.iter().any(|hole| hole.body == self.organ && hole.tools.contains(&tool) && open(hole))
@@ -61,7 +61,7 @@ struct Node {
 }
 
 impl PinnedSurface {
-    /// The pinned triangles of `world` where they are now, which is where they stay; none if
+    /// The pinned triangles of `world` at their present place, which never changes. None if
     /// instruments do not touch organs.
     pub fn felt(world: &World, contact: ContactParts) -> Self {
         if !contact.instruments {

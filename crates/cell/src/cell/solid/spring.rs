@@ -4,9 +4,9 @@
 //! steel tube of 5 mm and 0.5 mm wall that sticks out by 0.1 m yields at its end by 1 mm under 10 N
 //! (3 E I / L^3), and gears of 10 kN m/rad by about as much at the instrument. The spring stands
 //! for these. Let R be the depth at which the two axes would meet. At depths d beyond 3/4 R the
-//! spring hardens to k / (4 (1 - d/R))^2, so that no axis passes another.
+//! spring hardens to k / (4 (1 - d/R))^2: no axis passes another.
 
-/// Stiffness of solids that begin to touch (N/m).
+/// Stiffness of solids at first touch (N/m).
 const STIFFNESS: f64 = 1e4;
 
 /// Damping of solids that press on each other (N s/m). Masses at the tips are 0.2 kg across the
@@ -53,7 +53,7 @@ impl Spring {
     }
 
     /// The spring in series with the inertia of a free `mass` (kg) at its other end, over an
-    /// implicit step of `dt` (s). The force F moves that mass by dt^2 F / mass, so that the spring
+    /// implicit step of `dt` (s). The force F moves that mass by dt^2 F / mass. So the spring
     /// yields by the factor 1 / (1 + (k dt^2 + d dt) / mass).
     pub fn against(self, mass: f64, dt: f64) -> Self {
         let yielding = 1.0 + (self.stiffness * dt * dt + self.damping * dt) / mass;

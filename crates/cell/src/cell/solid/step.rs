@@ -1,8 +1,8 @@
 //! A physics step of all arms among solids.
 //!
 //! Ideal arms move first, as far as solids let them. Then arms with dynamics step, the left one
-//! first. Between two of them one spring acts. A trial step tells where the right arm would be
-//! without it. From there the spring pushes the left arm in its implicit step, softened by the mass
+//! first. Between two of them one spring acts. A trial step shows the right arm's motion without
+//! the spring. From there the spring pushes the left arm in its implicit step, softened by the mass
 //! that the right arm has at that place. Then the right arm steps with exactly the opposite force.
 
 use super::Solids;
@@ -21,7 +21,7 @@ use trocar_robot::manipulator::{MAX_OBSTACLES, Obstacle};
 /// Largest speed of an ideal arm (m/s): twice that of actions.
 const MAX_SPEED: f64 = 2.0 * TIP_SPEED;
 
-/// What is not touched yet counts in a step if it would be within this many steps.
+/// A solid that is not touched yet counts in a step if it would be touched within this many steps.
 const AHEAD: f64 = 2.0;
 
 /// Bisections of the way of an ideal arm that solids stop.
@@ -115,7 +115,8 @@ impl Solids {
         let saved = arms[k].drive.state();
         arms[k].step(Wrench::default(), &mut [], dt)?;
         let way = arms[k].drive.tip().translation.distance(before.translation);
-        // What stopped while its command went on is far behind. It must not jump over a solid.
+        // An arm that was stopped while its command continued is far behind. It must not jump over
+        // a solid.
         let most = (MAX_SPEED * dt / way).min(1.0);
         if most < 1.0 {
             arms[k].drive.restore(&saved)?;
@@ -150,13 +151,13 @@ impl Solids {
         let still = self.still(&arms[k], &rods).into_iter().map(|m| (m, None));
         let mut found: Vec<(Meeting, Option<usize>)> = still.collect();
         for (j, other) in arms.iter().enumerate() {
-            // Of two arms with dynamics the first finds their meetings.
+            // If both arms have dynamics, the first one finds their meetings.
             if other.is_ideal() || j > k {
                 found.extend(meetings(&rods, &other.rods_at(other.drive.tip())).map(|m| (m, Some(j))));
             }
         }
         found.retain(|(m, other)| m.gap < 0.0 || m.gap < AHEAD * dt * closing_speed(arms, k, m, *other));
-        // Stable: of equal ones the first stay.
+        // The sort is stable: equal ones keep their order.
         found.sort_by(|a, b| a.0.gap.total_cmp(&b.0.gap));
         found.truncate(MAX_OBSTACLES);
         let mut free = vec![None; arms.len()];

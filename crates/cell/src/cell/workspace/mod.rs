@@ -77,8 +77,8 @@ impl Workspace {
         }
     }
 
-    /// The reachable pose nearest to a wanted pose of the tip frame. Of two possible rolls, the one
-    /// nearer to that of `near` is chosen; the jaw is that of `near`.
+    /// The reachable pose nearest to a wanted pose of the tip frame. There are two possible rolls,
+    /// and the one nearer to that of `near` is chosen. The jaw is that of `near`.
     ///
     /// # Errors
     /// A pose that is not finite, or whose rotation is not normalized.

@@ -85,7 +85,7 @@ impl PortSpace {
     }
 }
 
-/// See [`Workspace::paced`](super::Workspace::paced). The tip goes no faster than [`TIP_SPEED`],
+/// See [`Workspace::paced`](super::Workspace::paced). The tip moves no faster than [`TIP_SPEED`],
 /// the shaft swings no faster than [`SWING_SPEED`] and rolls no faster than [`ROLL_SPEED`]. The jaw
 /// has its own drive.
 pub(super) fn paced(from: &Setpoint, to: &Setpoint, period: f64) -> (Setpoint, bool) {

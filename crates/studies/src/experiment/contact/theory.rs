@@ -26,7 +26,7 @@ mod tests {
     use super::*;
 
     /// Their equation 12, of incompressible tissue. Its last term has another sign than that of the
-    /// general equation, so that the two are 2.5% apart at 0.8; the study is at 0.3.
+    /// general equation. The two differ by 2.5% at 0.8; the study is at 0.3.
     #[test]
     fn the_layer_is_that_of_incompressible_tissue() {
         for thin in [0.05f64, 0.15, 0.3] {

@@ -15,8 +15,8 @@ const EDGE: f64 = 4.5e-3;
 /// (m).
 const CUBES: ([u32; 3], [f64; 3]) = ([24, 12, 3], [1.0625e-3, 1.2e-3, 1e-3]);
 
-/// Distance of the tissue's middle from the plane of the cut (m), so that no element lies to the
-/// same part on either side: a mesh like any other.
+/// Distance of the tissue's middle from the plane of the cut (m). With it no element has equal
+/// parts on both sides of the plane, as in an ordinary mesh.
 const ASIDE: f64 = 0.3e-3;
 
 /// Radius and half the length of the tube (m), the distance of its axis from the pivot, and the

@@ -43,8 +43,8 @@ pub(super) const GRASP_LIFT: f64 = 8e-3;
 /// Parts of the way of the grasp.
 pub(super) const GRASP_PARTS: usize = 4;
 
-/// An appendix with what holds it and what acts on it. Loads and measures are defined on the body,
-/// so that they are the same for every mesh.
+/// An appendix with what holds it and what acts on it. Loads and measures are defined on the body:
+/// they are the same for every mesh.
 pub(super) struct TestBody {
     /// The specimen's organ: mesh, material.
     pub organ: Organ,

@@ -119,8 +119,8 @@ impl Study for RobustnessExperiment {
         // be those of the scene as it is written, and counted again.
         let judged = scene.program()?.measures.iter().any(|measure| matches!(measure, Measure::Visible(..)));
         let run = all.iter().filter(|condition| judged || !condition.pictures);
-        // Each condition is known by its own scene and specimens, so that a run with more factors
-        // uses those of an earlier one again.
+        // Each condition is identified by its own scene and specimens: a run with more factors
+        // reuses those of an earlier one.
         let keyed = run.map(|c| Ok((format!("{} {}", c.key(), hash(c)?), c)));
         let keyed: Vec<(String, &Condition)> = keyed.collect::<Result<_>>()?;
         let Outcomes { rows, resumed } = job.trials(

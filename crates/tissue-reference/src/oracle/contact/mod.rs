@@ -1,10 +1,10 @@
 //! Contact with tools and between bodies, as the oracle sees it.
 //!
-//! Distances and normals are those of the present place, not of planes that are held. What has no
-//! potential is held during a minimisation and then found again, until the forces of the true law
-//! are in balance ([`super::rounds`]): friction's limits and planes, which features of the surface
-//! touch, and their stiffness. Shared with the fast solvers are only the model's data: stiffness of
-//! nodes, friction, and the shapes' distances.
+//! Distances and normals are those of the present place, not of fixed planes. Some quantities have
+//! no potential: friction's limits and planes, the touching features of the surface, and their
+//! stiffness. They are fixed during a minimisation and then updated, until the forces of the true
+//! law are in balance ([`super::rounds`]). Only the model's data are shared with the fast solvers:
+//! stiffness of nodes, friction, and the shapes' distances.
 //!
 //! - Nodes of the surface touch shapes by their signed distance.
 //! - With [`ToolContact::Surface`], edges and triangles touch axes of round shapes ([`features`]).
@@ -30,7 +30,7 @@ use trocar_core::{Pose, Wrench};
 use trocar_tissue::assembly::Stiffness;
 use trocar_tissue::{BodyContact, Collider, Model, ToolContact, ToolForce, ToolMotion};
 
-/// What is farther than this from where it touches is left out until it is looked for again (m).
+/// Features that are farther than this from a contact are left out until the next search (m).
 const REACH: f64 = 2e-3;
 
 /// Triangles that are farther than this from a vertex than the nearest one (m) are left out.
@@ -46,7 +46,7 @@ const FIRST_BLUR: f64 = 3e-5;
 const LAST_BLUR: f64 = 1e-7;
 const BLUR_SHARE: f64 = 0.2;
 
-/// What never changes of the contacts of some bodies.
+/// The constant part of the contacts of some bodies.
 pub struct Touching {
     colliders: Vec<Collider>,
     surfaces: Vec<Surface>,
@@ -150,8 +150,8 @@ impl<'a> Contacts<'a> {
         Self { of, stiffness, fixed, poses, start, list: Vec::new(), blur: FIRST_BLUR / BLUR_SHARE }
     }
 
-    /// Finds what may touch near `x`, and holds what has no potential as it is there; without
-    /// friction unless `rubs`.
+    /// Finds possible contacts near `x`, and fixes everything without a potential at its value
+    /// there. Without friction unless `rubs`.
     pub fn hold(&mut self, x: &[DVec3], rubs: bool) {
         self.blur = (BLUR_SHARE * self.blur).max(LAST_BLUR);
         let mut list = Vec::new();

@@ -24,7 +24,7 @@ pub struct Piece<'a> {
     pub kind: Kind<'a>,
 }
 
-/// What is how far from what.
+/// The two things between which a distance is measured.
 #[derive(Clone)]
 pub enum Kind<'a> {
     /// A node from a shape where its tool is at the end: signed.

@@ -23,7 +23,7 @@ fn scene() -> Model {
     let lower = block([3, 3, 1], 3e-3);
     let mut upper = block([2, 2, 1], 3e-3);
     upper.vertices.iter_mut().for_each(|p| *p = DVec3::new(1.1, 1.3, 0.0) * 1e-3 + *p + DVec3::Z * 3e-3);
-    // What is apart at rest has the whole offset.
+    // Bodies that are apart at rest have the whole offset.
     upper.vertices.iter_mut().for_each(|p| p.z += 2e-3);
     let contact = BodyContact { friction: 0.4, ..BodyContact::default() };
     let mut builder = ModelBuilder::new().gravity(GRAVITY).tool_contact(ToolContact::Surface).body_contact(contact);

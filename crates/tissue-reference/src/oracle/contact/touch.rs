@@ -7,7 +7,7 @@ use crate::oracle::state::TouchKey;
 use glam::{DMat3, DVec3};
 use trocar_tissue::assembly::Stiffness;
 
-/// What of a contact has a potential only while it is held.
+/// The part of a contact that has a potential only while it is fixed.
 #[derive(Clone, Default)]
 pub struct Grip {
     /// Unit normal of friction's plane.
@@ -25,7 +25,8 @@ pub struct Touch<'a> {
     pub key: TouchKey,
     /// The distances of which the smallest counts.
     pub pieces: Vec<Piece<'a>>,
-    /// What the first node is outside of or inside, where distances have no sign.
+    /// The surface that decides whether the first node is outside or inside, where distances have
+    /// no sign.
     pub surface: Option<&'a Surface>,
     /// Distance without force (m).
     pub free: f64,
