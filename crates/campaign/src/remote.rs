@@ -212,6 +212,9 @@ pub(super) fn check_servers(policies: &[&PolicySpec], progress: &dyn Progress) -
         endpoint.interrupt = Some(Arc::clone(&stop));
         endpoints.push(endpoint);
     }
+    if endpoints.is_empty() {
+        return Ok(());
+    }
     std::thread::scope(|scope| {
         let connect = || endpoints.iter().try_for_each(|endpoint| Client::connect(endpoint).map(|_| ()));
         let connecting = scope.spawn(connect);
