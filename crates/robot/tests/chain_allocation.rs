@@ -14,7 +14,7 @@ fn steps_and_searches_do_not_allocate() {
     let arm = SerialArm::franka_fr3().unwrap().with_payload(common::rod(0.5, 0.2)).unwrap();
     let mut state = ArmState::at_rest(arm.home());
     let options = InverseOptions { restarts: 4, ..InverseOptions::default() };
-    let before = PEAK.allocations();
+    let before = PEAK.allocations_of_thread();
     let mut pushed = 0.0;
     for _ in 0..480 {
         let dynamics = arm.dynamics(&state.q, &state.qd);
@@ -26,10 +26,10 @@ fn steps_and_searches_do_not_allocate() {
         pushed += touch[0].force;
         arm.inverse(&flange, &arm.home(), &options).unwrap();
     }
-    let during = PEAK.allocations() - before;
+    let during = PEAK.allocations_of_thread() - before;
     let mut controlled = common::cell(0, trocar_robot::manipulator::ControllerSettings::default());
     let start = controlled.commanded();
-    let made = PEAK.allocations();
+    let made = PEAK.allocations_of_thread();
     for k in 0..480 {
         if k % 16 == 0 {
             let tip = common::tip_circle(&controlled, &start, f64::from(k) / 480.0);
@@ -41,7 +41,7 @@ fn steps_and_searches_do_not_allocate() {
         controlled.step(trocar_core::Wrench::default(), 1.0 / 480.0).unwrap();
         pushed += controlled.measured_cf().force.length() + controlled.coordinates().0.insertion;
     }
-    let controlling = PEAK.allocations() - made;
+    let controlling = PEAK.allocations_of_thread() - made;
     assert_eq!(controlling, 0, "allocations of a manipulator");
 
     assert!(pushed > 0.0);

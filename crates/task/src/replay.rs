@@ -27,6 +27,9 @@ const START: &[u8] = b"{\"format\":\"trocar-episode\"";
 /// What a file is that does not begin so.
 const NO_EPISODE: &str = "is no episode file; name the folder of an episode, or its episode.trocar";
 
+/// What is wrong with a file that does not exist.
+const NO_FILE: &str = "no such file; name the folder of an episode, or its episode.trocar";
+
 /// Largest file (bytes): a million steps.
 const MAX_BYTES: u64 = 100 << 20;
 /// Longest header line (bytes).
@@ -188,7 +191,12 @@ impl EpisodeFile {
     /// # Errors
     /// Names the file and what is wrong with it.
     pub fn read(path: &Path) -> Result<Self> {
-        let io = |source| Error::Io { path: path.to_owned(), source };
+        let io = |source: std::io::Error| {
+            if source.kind() == std::io::ErrorKind::NotFound {
+                return Error::Invalid { path: path.to_owned(), reason: NO_FILE.to_owned() };
+            }
+            Error::Io { path: path.to_owned(), source }
+        };
         let length = std::fs::metadata(path).map_err(io)?.len();
         if length > MAX_BYTES {
             let reason = format!("has {length} bytes; at most {MAX_BYTES} are read");

@@ -1,7 +1,13 @@
 //! The system's allocator with a count of allocations and a measurement of peak memory.
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+thread_local! {
+    /// Number of allocations of the thread. It needs no memory of its own and no destructor.
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+}
 
 /// An allocator that counts allocations and allocated bytes of all threads.
 #[derive(Debug)]
@@ -33,13 +39,20 @@ impl Peak {
         self.most.load(Ordering::Relaxed).saturating_sub(self.start.load(Ordering::Relaxed))
     }
 
-    /// Number of allocations so far.
+    /// Number of allocations of the calling thread so far. The test harness allocates in a thread
+    /// of its own, at any time.
+    pub fn allocations_of_thread(&self) -> usize {
+        COUNT.try_with(Cell::get).unwrap_or_default()
+    }
+
+    /// Number of allocations of all threads so far.
     pub fn allocations(&self) -> usize {
         self.count.load(Ordering::Relaxed)
     }
 
     fn grew(&self, by: usize) {
         self.count.fetch_add(1, Ordering::Relaxed);
+        let _ = COUNT.try_with(|count| count.set(count.get() + 1));
         let now = self.now.fetch_add(by, Ordering::Relaxed) + by;
         self.most.fetch_max(now, Ordering::Relaxed);
     }
