@@ -56,9 +56,9 @@ impl ArmUnit {
         }
         let force = opening_force(&state.gripper, Tools::of(0), &state.forces);
         if target < angle {
-            // One blade that presses pushes the arm, which has to yield first.
+            // One blade that presses pushes the arm, which has to yield first. Scissors cut instead.
             let blades = state.forces[1].contact.force + state.forces[2].contact.force;
-            if blades.length() > model.force_limit {
+            if state.bite.is_none() && blades.length() > model.force_limit {
                 return angle;
             }
             let free = state.jaw.squeeze(angle, force).max(target);

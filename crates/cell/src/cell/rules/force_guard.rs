@@ -6,8 +6,8 @@
 //! not enough, because the pressure remains. So the guard does two things:
 //!
 //! - Commands, 30 times a second: the part of a motion against the load becomes shorter as the load
-//!   nears the limit; beyond the limit the instrument retracts. The part aside becomes slow: what
-//!   lies beside may be harder. The motion is measured from the arm's reference, because commands are
+//!   nears the limit; beyond the limit the instrument retracts. Under a load of tissue the part
+//!   aside becomes slow, because what lies beside may be harder. The motion is measured from the arm's reference, because commands are
 //!   up to 20 mm ahead of a fast arm.
 //! - Stops, 60 times a second: an arm that would pass the limit before the next chance to stop it
 //!   stops at once, and so does one that is about to hit tissue fast ([`super::approach`]). A
@@ -48,6 +48,10 @@ const CREEP: f64 = 0.01;
 /// A motion of which more than this share goes away from the load is a retreat.
 const MOSTLY: f64 = 0.5;
 
+/// From this load on (N) the whole stiffness seen so far counts, below it a share: the secant of a
+/// light touch over a short way says little, and would hold an arm that hardly presses.
+const TRUSTED: f64 = 2.0;
+
 /// Decay of the stiffness from one tissue frame to the next.
 const FORGETTING: f64 = 0.99;
 
@@ -77,6 +81,8 @@ pub(crate) struct ForceGuard {
     stiffness: f64,
     /// Load (N) and place (m) at the end of the last frame.
     last: [DVec4; 2],
+    /// The part of tissue in that load, as a magnitude (N).
+    pressed: f64,
     /// Motion in the last frame (m).
     motion: DVec4,
     /// Place of the arm's reference at its end, and the reference's motion in it (m).
@@ -128,6 +134,7 @@ impl ForceGuard {
         let against = -way.dot(load.normalize_or_zero());
         self.strained = strained.will_exceed(&self.tissue, against, STRAIN_FRAMES);
         (self.last, self.motion, self.tissue) = ([load, at], way, strained);
+        self.pressed = if load == force { tissue.length() } else { load.length() };
         self.rise = load.length() - was.length();
         self.reference = [reference, reference - self.reference[0]];
         self.hit = DVec3::ZERO;
@@ -167,15 +174,21 @@ impl ForceGuard {
         let stiffest = if room < 0.0 { SOLID_STIFFNESS } else { STIFFNESS[1] };
         let gain = 1.0 - (1.0 - GAIN) * (size / (FROM_SHARE * limit)).min(1.0);
         // Beyond the limit this is negative: the minimum retraction.
-        let most = (gain * room / self.stiffness.clamp(STIFFNESS[0], stiffest)).clamp(-RETREAT, fastest);
-        if size > FROM_SHARE * limit {
-            // Beside what presses there may be something harder. Beyond the limit it only retracts.
-            let left = (limit - size) / ((1.0 - FROM_SHARE) * limit);
+        let most = (gain * room / self.stiffness_under(size).clamp(STIFFNESS[0], stiffest)).clamp(-RETREAT, fastest);
+        if self.pressed > FROM_SHARE * limit {
+            // Beside tissue that presses there may be harder tissue. Beyond the limit it only
+            // retracts. Along a solid it slides: instruments that meet must get past each other.
+            let left = (limit - self.pressed) / ((1.0 - FROM_SHARE) * limit);
             let speed = if left < -DEADBAND { 0.0 } else { CREEP + left.max(0.0) * (FASTEST_TOUCH - CREEP) };
             aside = aside.clamp_length_max(period * speed);
         }
         let allowed = against.min(most);
         if allowed == against && aside == way + against * out { way } else { aside - allowed * out }
+    }
+
+    /// The stiffness that counts under a load of `size` (N), in N/m.
+    fn stiffness_under(&self, size: f64) -> f64 {
+        self.stiffness * (size / TRUSTED).powi(2).min(1.0)
     }
 
     /// Whether the tissue at the instrument soon is strained beyond the guard's limits.
@@ -197,7 +210,7 @@ impl ForceGuard {
             return self.hit != DVec3::ZERO;
         }
         let fastest = against[0].max(against[1]);
-        let ahead = self.stiffness.max(STIFFNESS[0]) * fastest;
+        let ahead = self.stiffness_under(size).max(STIFFNESS[0]) * fastest;
         let passes = size + STOPPING_FRAMES * ahead.max(self.rise) > limit;
         let goes_on = self.strained || fastest > FASTEST_TOUCH * FRAME;
         self.hit != DVec3::ZERO || passes || against[1] > LEAST_MOTION && goes_on
@@ -217,6 +230,7 @@ impl ForceGuard {
         let Self {
             stiffness,
             last: [load, at],
+            pressed,
             motion,
             reference: [sent, moved],
             rise,
@@ -228,7 +242,7 @@ impl ForceGuard {
         let vectors = [load, at, motion, sent, moved].map(|v| v.to_array());
         let flags = [strained, reported].map(|flag| f64::from(u8::from(flag)));
         let vectors = vectors.into_iter().flatten().chain(hit.to_array());
-        vectors.chain(tissue.numbers()).chain(flags).chain([stiffness, rise])
+        vectors.chain(tissue.numbers()).chain(flags).chain([stiffness, rise, pressed])
     }
 }
 
