@@ -81,13 +81,14 @@ pub(crate) struct ForceGuard {
     stiffness: f64,
     /// Load (N) and place (m) at the end of the last frame.
     last: [DVec4; 2],
-    /// The part of tissue in that load, as a magnitude (N).
-    pressed: f64,
+    /// Forces of tissue and of solids then (N). The load is larger than their sum where tissue is
+    /// strained.
+    forces: [DVec4; 2],
     /// Motion in the last frame (m).
     motion: DVec4,
     /// Place of the arm's reference at its end, and the reference's motion in it (m).
     reference: [DVec4; 2],
-    /// Growth of the load in it (N); negative if it fell.
+    /// Growth of the force in it (N); negative if it fell.
     rise: f64,
     /// The tissue at the instrument then.
     tissue: TissueAtArm,
@@ -122,10 +123,11 @@ impl ForceGuard {
         } else {
             force
         };
-        let [was, there] = self.last;
-        let (change, way) = (load - was, at - there);
+        let [_, there] = self.last;
+        let was = self.forces[0] + self.forces[1];
+        let (change, way) = (force - was, at - there);
         self.stiffness *= FORGETTING;
-        if way.length() > LEAST_MOTION && load.length() > 0.0 {
+        if way.length() > LEAST_MOTION && force.length() > 0.0 {
             self.stiffness = self.stiffness.max(-change.dot(way) / way.length_squared());
         }
         if solid != DVec4::ZERO {
@@ -134,8 +136,8 @@ impl ForceGuard {
         let against = -way.dot(load.normalize_or_zero());
         self.strained = strained.will_exceed(&self.tissue, against, STRAIN_FRAMES);
         (self.last, self.motion, self.tissue) = ([load, at], way, strained);
-        self.pressed = if load == force { tissue.length() } else { load.length() };
-        self.rise = load.length() - was.length();
+        self.forces = [tissue, solid];
+        self.rise = force.length() - was.length();
         self.reference = [reference, reference - self.reference[0]];
         self.hit = DVec3::ZERO;
     }
@@ -174,11 +176,12 @@ impl ForceGuard {
         let stiffest = if room < 0.0 { SOLID_STIFFNESS } else { STIFFNESS[1] };
         let gain = 1.0 - (1.0 - GAIN) * (size / (FROM_SHARE * limit)).min(1.0);
         // Beyond the limit this is negative: the minimum retraction.
-        let most = (gain * room / self.stiffness_under(size).clamp(STIFFNESS[0], stiffest)).clamp(-RETREAT, fastest);
-        if self.pressed > FROM_SHARE * limit {
+        let most = (gain * room / self.stiffness_under_load().clamp(STIFFNESS[0], stiffest)).clamp(-RETREAT, fastest);
+        let pressed = self.forces[0].length();
+        if pressed > FROM_SHARE * limit {
             // Beside tissue that presses there may be harder tissue. Beyond the limit it only
             // retracts. Along a solid it slides: instruments that meet must get past each other.
-            let left = (limit - self.pressed) / ((1.0 - FROM_SHARE) * limit);
+            let left = (limit - pressed) / ((1.0 - FROM_SHARE) * limit);
             let speed = if left < -DEADBAND { 0.0 } else { CREEP + left.max(0.0) * (FASTEST_TOUCH - CREEP) };
             aside = aside.clamp_length_max(period * speed);
         }
@@ -186,9 +189,10 @@ impl ForceGuard {
         if allowed == against && aside == way + against * out { way } else { aside - allowed * out }
     }
 
-    /// The stiffness that counts under a load of `size` (N), in N/m.
-    fn stiffness_under(&self, size: f64) -> f64 {
-        self.stiffness * (size / TRUSTED).powi(2).min(1.0)
+    /// The stiffness that counts under the present force (N/m).
+    fn stiffness_under_load(&self) -> f64 {
+        let [tissue, solid] = self.forces;
+        self.stiffness * ((tissue + solid).length() / TRUSTED).powi(2).min(1.0)
     }
 
     /// Whether the tissue at the instrument soon is strained beyond the guard's limits.
@@ -210,7 +214,7 @@ impl ForceGuard {
             return self.hit != DVec3::ZERO;
         }
         let fastest = against[0].max(against[1]);
-        let ahead = self.stiffness_under(size).max(STIFFNESS[0]) * fastest;
+        let ahead = self.stiffness_under_load().max(STIFFNESS[0]) * fastest;
         let passes = size + STOPPING_FRAMES * ahead.max(self.rise) > limit;
         let goes_on = self.strained || fastest > FASTEST_TOUCH * FRAME;
         self.hit != DVec3::ZERO || passes || against[1] > LEAST_MOTION && goes_on
@@ -230,7 +234,7 @@ impl ForceGuard {
         let Self {
             stiffness,
             last: [load, at],
-            pressed,
+            forces: [tissue_force, solid_force],
             motion,
             reference: [sent, moved],
             rise,
@@ -239,10 +243,10 @@ impl ForceGuard {
             hit,
             reported,
         } = *self;
-        let vectors = [load, at, motion, sent, moved].map(|v| v.to_array());
+        let vectors = [load, at, tissue_force, solid_force, motion, sent, moved].map(|v| v.to_array());
         let flags = [strained, reported].map(|flag| f64::from(u8::from(flag)));
         let vectors = vectors.into_iter().flatten().chain(hit.to_array());
-        vectors.chain(tissue.numbers()).chain(flags).chain([stiffness, rise, pressed])
+        vectors.chain(tissue.numbers()).chain(flags).chain([stiffness, rise])
     }
 }
 
