@@ -21,7 +21,8 @@ impl ArmUnit {
         let Self { model, drive, state } = self;
         let pose = state.gripper.pose;
         let shaft = pose.rotation * DVec3::X;
-        let loads = [state.exchange.wrench(), state.solid.wrench()].map(|wrench| load(wrench, shaft));
+        // A roll does not give way to solids: instruments that meet push each other aside.
+        let loads = [load(state.exchange.wrench(), shaft), state.solid.force().extend(0.0)];
         let at = place(pose.translation, drive.measured().0.roll());
         let sent = drive.reference();
         let reference = place(model.workspace.tip(&sent).translation, sent.roll());

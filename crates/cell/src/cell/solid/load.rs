@@ -1,16 +1,14 @@
 //! The force of solids on an instrument, for the force guard and the report.
 
 use glam::DVec3;
-use trocar_core::Wrench;
 
 /// The force of solids on an instrument.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::cell) struct SolidLoad {
-    /// Mean over the physics steps of the last frame of tissue: force (N) and torque about the tip
-    /// (N m), in the cell.
-    mean: Wrench,
-    /// Sum over the physics steps of the frame that runs.
-    sum: Wrench,
+    /// Mean over the physics steps of the last frame of tissue (N), in the cell.
+    mean: DVec3,
+    /// Sum over the physics steps of the frame that runs (N).
+    sum: DVec3,
     /// Largest magnitude in a physics step of the period (N).
     pub peak: f64,
 }
@@ -21,26 +19,20 @@ impl SolidLoad {
         self.peak = 0.0;
     }
 
-    /// Adds a physics step with the force (N) and the torque about the tip (N m) of a `wrench`.
-    pub fn add(&mut self, wrench: Wrench) {
-        self.sum += wrench;
-        self.peak = self.peak.max(wrench.force.length());
+    /// Adds a physics step with `force` (N).
+    pub fn add(&mut self, force: DVec3) {
+        self.sum += force;
+        self.peak = self.peak.max(force.length());
     }
 
     /// Ends a frame of tissue with `steps` physics steps.
     pub fn end_frame(&mut self, steps: u32) {
-        let share = 1.0 / f64::from(steps);
-        self.mean = Wrench { force: share * self.sum.force, torque: share * self.sum.torque };
-        self.sum = Wrench::default();
+        self.mean = self.sum / f64::from(steps);
+        self.sum = DVec3::ZERO;
     }
 
     /// Mean force over the last frame of tissue (N), in the cell.
     pub fn force(&self) -> DVec3 {
-        self.mean.force
-    }
-
-    /// The same with the mean torque about the tip (N m).
-    pub fn wrench(&self) -> Wrench {
         self.mean
     }
 
@@ -48,9 +40,8 @@ impl SolidLoad {
     /// equal those of earlier versions.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
         let Self { mean, sum, peak } = *self;
-        let any = mean != Wrench::default() || sum != Wrench::default() || peak != 0.0;
-        let vectors = [mean.force, mean.torque, sum.force, sum.torque].map(|v| v.to_array());
-        let all = vectors.into_iter().flatten().chain([peak]);
-        all.take(if any { 13 } else { 0 })
+        let any = mean != DVec3::ZERO || sum != DVec3::ZERO || peak != 0.0;
+        let all = mean.to_array().into_iter().chain(sum.to_array()).chain([peak]);
+        all.take(if any { 7 } else { 0 })
     }
 }

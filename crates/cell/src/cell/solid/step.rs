@@ -70,8 +70,8 @@ impl Solids {
                 for meeting in self.still(&arms[k], &arms[k].rods_at(tip)) {
                     arms[k].state.pressed.add(&meeting, Spring::at(meeting.gap, meeting.room).force());
                 }
-                let own = self.wrench_at(arms, k, tip, false);
-                arms[k].state.solid.add(own + about(given[k], tip.translation));
+                let own = self.force_at(arms, k, tip, false);
+                arms[k].state.solid.add(own + given[k].force);
             }
         }
         Ok(())
@@ -95,9 +95,9 @@ impl Solids {
         found
     }
 
-    /// The force at rest (N) of solids on arm `k` with its tip frame at `tip`, and its torque about
-    /// the tip (N m); other arms with dynamics count if `all`.
-    fn wrench_at(&self, arms: &[ArmUnit], k: usize, tip: Pose, all: bool) -> Wrench {
+    /// The force at rest (N) of solids on arm `k` with its tip frame at `tip`; other arms with
+    /// dynamics count if `all`.
+    fn force_at(&self, arms: &[ArmUnit], k: usize, tip: Pose, all: bool) -> DVec3 {
         let rods = arms[k].rods_at(tip);
         let mut found = self.still(&arms[k], &rods);
         for (j, other) in arms.iter().enumerate() {
@@ -105,8 +105,7 @@ impl Solids {
                 found.extend(meetings(&rods, &other.rods_at(other.drive.tip())));
             }
         }
-        let push = |m: &Meeting| Wrench::at(Spring::at(m.gap, m.room).force() * m.normal, m.point - tip.translation);
-        found.iter().map(push).fold(Wrench::default(), |sum, wrench| sum + wrench)
+        found.iter().map(|m| Spring::at(m.gap, m.room).force() * m.normal).sum()
     }
 
     /// Moves ideal arm `k` until solids push it with the force limit, or no more than before.
@@ -122,7 +121,7 @@ impl Solids {
             arms[k].drive.restore(&saved)?;
             arms[k].drive.step_part(most, dt);
         }
-        let force = |arms: &[ArmUnit], tip: Pose| self.wrench_at(arms, k, tip, true).force.length();
+        let force = |arms: &[ArmUnit], tip: Pose| self.force_at(arms, k, tip, true).length();
         let limit = arms[k].model.stop_force;
         let pushed = force(arms, arms[k].drive.tip());
         if pushed <= limit {
@@ -178,12 +177,13 @@ impl Solids {
             Obstacle { point, normal, gap, stiffness, damping, speed, force: 0.0 }
         };
         let mut obstacles: Vec<Obstacle> = found.iter().map(obstacle).collect();
-        let load = about(given[k], tip.translation);
+        let Wrench { force, torque } = given[k];
+        let load = Wrench { force, torque: torque - tip.translation.cross(force) };
         arms[k].step(load, &mut obstacles, dt)?;
-        let mut sum = load;
+        let mut sum = force;
         for ((meeting, other), obstacle) in found.iter().zip(&obstacles) {
             let force = obstacle.force * meeting.normal;
-            sum += Wrench::at(force, meeting.point - tip.translation);
+            sum += force;
             arms[k].state.pressed.add(meeting, obstacle.force);
             if let Some(j) = other {
                 given[*j] += Wrench { force: -force, torque: meeting.point.cross(-force) };
@@ -192,11 +192,6 @@ impl Solids {
         arms[k].state.solid.add(sum);
         Ok(())
     }
-}
-
-/// The wrench about the cell's origin as one about `tip` (m).
-fn about(Wrench { force, torque }: Wrench, tip: DVec3) -> Wrench {
-    Wrench { force, torque: torque - tip.cross(force) }
 }
 
 /// Speed with which arm `k` comes nearer to what it may meet, arm `other` or the solid world (m/s).

@@ -10,7 +10,6 @@ use crate::cell::arm::{ArmState, Held, Wanted};
 use crate::hold::Hold;
 use crate::severance::Parting;
 use glam::{DVec3, DVec4};
-use trocar_core::Wrench;
 use trocar_testing::tube::{self, ONE_END, specimen};
 use trocar_tissue::{Hole, ToolForce};
 
@@ -67,7 +66,7 @@ fn changes(state: &ArmState, hold: &Hold) -> Vec<(&'static str, ArmState)> {
         ("held_back", changed(&|s| s.held_back ^= true)),
         ("guard", changed(&|s| s.guard.end_frame([DVec4::X, DVec4::ZERO], Default::default(), [DVec4::Y; 2], 10.0))),
         ("guarded", changed(&|s| s.guarded ^= true)),
-        ("solid", changed(&|s| s.solid.add(Wrench { force: 1e-9 * DVec3::X, torque: DVec3::ZERO }))),
+        ("solid", changed(&|s| s.solid.add(1e-9 * DVec3::X))),
         ("pressed", changed(&|s| s.pressed.end_frame(8, [force_on_shaft(1e-9)].into_iter()))),
         ("gripper", changed(&|s| s.gripper.pose.translation.x += 1e-9)),
         ("jaw angle", changed(&|s| s.gripper.jaw_angle += 1e-9)),
