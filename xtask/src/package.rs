@@ -11,12 +11,12 @@ const PAGE: &str = "crates/view/page";
 /// The licence texts, which every crate carries.
 const LICENCES: [&str; 2] = ["LICENSE-APACHE", "LICENSE-MIT"];
 
-/// Packages all crates into `target/package`. What they carry from elsewhere is in their folders for
-/// that time only: a program of a clone serves `viewer/dist`, which changes.
+/// Packages all crates into `target/package`. What they carry from elsewhere is in their folders
+/// for that time only: a program of a clone serves `viewer/dist`, which changes.
 pub fn package() -> Result<(), String> {
     let changed = Command::new("git").args(["status", "--porcelain"]).output().map_err(|e| format!("git: {e}"))?;
     if !changed.status.success() || !changed.stdout.is_empty() {
-        return Err("packages are made of what is committed; commit first".to_owned());
+        return Err("packages contain committed files only; commit first".to_owned());
     }
     viewer::build()?;
     let root = Path::new(".");

@@ -11,8 +11,8 @@
 //! Nothing is added at rest.
 //!
 //! Contact that is deep, on tissue that is squeezed or half pinned, is far stiffer along the force
-//! than tissue is otherwise. That stiffness counts along the force only: across it, it would hold the
-//! arm.
+//! than tissue is otherwise. That stiffness counts along the force only: across it, it would hold
+//! the arm.
 
 use glam::DVec3;
 use trocar_core::Wrench;
@@ -152,9 +152,9 @@ mod tests {
         }
     }
 
-    /// A tip of 3 kg with a damping of 60 N s/m on a spring of 3000 N/m that presses with 5 N on a wall
-    /// of `stiffness` (N/m), which only pushes. It is released 0.1 mm too deep. Returns the largest
-    /// distance from where it is in balance in the last of three seconds (m).
+    /// A tip of 3 kg with a damping of 60 N s/m on a spring of 3000 N/m that presses with 5 N on a
+    /// wall of `stiffness` (N/m), which only pushes. It is released 0.1 mm too deep. Returns the
+    /// largest distance from where it is in balance in the last of three seconds (m).
     fn pressed(stiffness: f64, along: bool) -> f64 {
         let balance = 5.0 / (stiffness + 3000.0);
         let (mut x, mut v, dt) = (balance + 1e-4, 0.0, 1.0 / 480.0);

@@ -1,6 +1,6 @@
 //! Stage 1: the action is checked whole. After the control delay each arm gets a setpoint for the
-//! length of a period: within its speed limits, above the floor, and no further against a force than
-//! the force guard allows.
+//! length of a period: within its speed limits, above the floor, and no further against a force
+//! than the force guard allows.
 
 use crate::cell::Cell;
 use crate::cell::action::Action;

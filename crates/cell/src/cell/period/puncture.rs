@@ -40,8 +40,8 @@ impl Cell {
 }
 
 impl ArmUnit {
-    /// The organs that the instrument punctures now: each with a place of its axis inside (m) and the
-    /// force with which it pressed (N).
+    /// The organs that the instrument punctures now: each with a place of its axis inside (m) and
+    /// the force with which it pressed (N).
     fn punctures(&self, world: &World) -> Vec<(usize, DVec3, f64)> {
         let hard = |organ: usize| self.state.pressed.peak(organ) >= self.model.puncture_force;
         if !(0..world.model.bodies().len()).any(hard) {

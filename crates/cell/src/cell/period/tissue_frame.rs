@@ -56,7 +56,8 @@ impl ArmUnit {
         }
         let force = opening_force(&state.gripper, Tools::of(0), &state.forces);
         if target < angle {
-            // One blade that presses pushes the arm, which has to yield first. Scissors cut instead.
+            // One blade that presses pushes the arm, which has to yield first. Scissors cut
+            // instead.
             let blades = state.forces[1].contact.force + state.forces[2].contact.force;
             if state.bite.is_none() && blades.length() > model.force_limit {
                 return angle;

@@ -16,10 +16,10 @@
 //! The stiffness seen so far limits each step, as in [`crate::Jaw`]: a fixed gain would oscillate
 //! on stiff tissue or be slow on soft tissue.
 //!
-//! The load is the force on the instrument and the torque about its shaft, as a force at a lever: an
-//! open jaw that rolls into tissue presses on it as one that is pushed does. So loads and motions
-//! have four numbers. Where the strain of tissue is nearer to its limit than the force is to the
-//! force limit, the load has that share of the limit.
+//! The load is the force on the instrument and the torque of tissue about its shaft, as a force at a
+//! lever: an open jaw that rolls into tissue presses on it as one that is pushed does. So loads and
+//! motions have four numbers. Where the strain of tissue is nearer to its limit than the force is
+//! to the force limit, the load has that share of the limit.
 
 use super::TissueAtArm;
 use crate::FRAME;
@@ -107,9 +107,9 @@ impl ForceGuard {
         Self { last: [DVec4::ZERO, at], reference: [at, DVec4::ZERO], ..Self::default() }
     }
 
-    /// Ends a tissue frame with the instrument `at` a place and the arm's reference at another, under
-    /// the loads ([`load`]) of `tissue`, which is strained, and of solids; `limit` is that of the
-    /// force (N).
+    /// Ends a tissue frame with the instrument `at` a place and the arm's reference at another,
+    /// under the loads ([`load`]) of `tissue`, which is strained, and of solids; `limit` is that of
+    /// the force (N).
     pub fn end_frame(
         &mut self,
         [tissue, solid]: [DVec4; 2],
@@ -153,9 +153,9 @@ impl ForceGuard {
         self.hit = hit;
     }
 
-    /// The allowed part of a motion (m) that is commanded for the next `period` (s), so that the load
-    /// stays below `limit` (N); the same motion if it is allowed whole. `way` begins at the arm's
-    /// reference; a difference of places.
+    /// The allowed part of a motion (m) that is commanded for the next `period` (s), so that the
+    /// load stays below `limit` (N); the same motion if it is allowed whole. `way` begins at the
+    /// arm's reference; a difference of places.
     pub fn allow(&self, way: DVec4, limit: f64, period: f64) -> DVec4 {
         if !limit.is_finite() {
             return way;
@@ -329,7 +329,8 @@ mod tests {
     #[test]
     fn a_roll_that_presses_is_a_load_too() {
         let shaft = DVec3::Z;
-        // 12 N at an open blade's tip against a positive roll, and as much the other way at the shaft.
+        // 12 N at an open blade's tip against a positive roll, and as much the other way at the
+        // shaft.
         let torque = load(Wrench { force: DVec3::ZERO, torque: -0.12 * shaft }, shaft);
         let wanted = place(DVec3::ZERO, 0.05);
         let (tip, roll) = tip_and_roll(under(torque).allow(wanted, 10.0, PERIOD));
@@ -340,7 +341,8 @@ mod tests {
 
     #[test]
     fn a_retreat_goes_on_and_an_advance_stops() {
-        // Beyond the limit, and the instrument still comes nearer by a tenth of a millimetre a frame.
+        // Beyond the limit, and the instrument still comes nearer by a tenth of a millimetre a
+        // frame.
         let stops = |sent: DVec4| {
             let mut guard = ForceGuard::default();
             for frame in 0..2 {

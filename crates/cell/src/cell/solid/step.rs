@@ -57,7 +57,8 @@ impl Solids {
                 self.move_ideal(arms, k, dt)?;
             }
         }
-        // Force (N) and torque about the cell's origin (N m) of meetings that another arm has found.
+        // Force (N) and torque about the cell's origin (N m) of meetings that another arm has
+        // found.
         let mut given = vec![Wrench::default(); arms.len()];
         for k in 0..arms.len() {
             if !arms[k].is_ideal() {
