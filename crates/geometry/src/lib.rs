@@ -38,6 +38,7 @@ mod segments;
 mod shapes;
 mod skin;
 mod smooth;
+pub mod symmetric;
 mod tet_mesh;
 mod tri_mesh;
 

@@ -7,8 +7,8 @@
 use crate::Hexahedron;
 use crate::flow::Flow;
 use crate::material::{Material, Part, Principal};
-use crate::symmetric::{Svd, nearest_rotation};
 use glam::{DMat3, DVec3};
+use trocar_geometry::symmetric::{Svd, nearest_rotation};
 
 /// Offset of Gauss's two points from the middle of a side, over the side.
 const GAUSS: f64 = 0.288_675_134_594_812_9;

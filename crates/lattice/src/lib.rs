@@ -62,7 +62,6 @@ mod pcg;
 mod pieces;
 mod potential;
 mod ramify;
-mod symmetric;
 
 pub use body::{Body, BodyDescription, BodyState, Conditions, PointLoad, Spring};
 pub use elastic::RestStiffness;

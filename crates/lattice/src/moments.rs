@@ -1,8 +1,8 @@
 //! Moments of the material inside a cell: volume, mean, covariance, shares of the corners.
 
 use crate::clip::{Tet, volume};
-use crate::symmetric::eigen;
 use glam::{DMat3, DVec3, Vec3Swizzles};
+use trocar_geometry::symmetric::eigen;
 
 /// Integrals over the material in a cell, in the cell's own coordinates from 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -132,5 +132,5 @@ fn a_replay_draws_nothing() {
     let end = bytes.iter().position(|b| *b == b'\n').unwrap();
     let header = String::from_utf8(bytes[..end].to_vec()).unwrap().replace("\"version\":6", "\"version\":5");
     let said = EpisodeFile::parse(&[header.as_bytes(), &bytes[end..]].concat()).unwrap_err();
-    assert!(said.contains("version 5; trocar-episode version 6 is read"), "{said}");
+    assert!(said.contains("version 5; trocar-episode version 7 is read"), "{said}");
 }

@@ -186,7 +186,7 @@ fn struck_block() {
         vec![at(DVec3::new(2e-3, 0.0, -11e-3) * t), at(DVec3::new(8e-3, 0.0, -3e-3) * t)]
     };
     let found = hashes(&model, &state, 24, &tools, &[]);
-    check("struck block", found, [0x74decbad8bbe370e, 0x1274898424fbf17c, 0x4faae1f8a7e5c994]);
+    check("struck block", found, [0x74decbad8bbe370e, 0xfada90db0ea25b12, 0xd5b6c714c36fa0eb]);
 }
 
 /// Elements pressed almost flat, thrown inwards and hit: it overstretches.
@@ -208,7 +208,7 @@ fn flat_elements() {
     }
     let tools = |k: usize| vec![at(DVec3::new(0.0, 0.0, -9e-3) * bump(k, 6))];
     let found = hashes(&model, &state, 12, &tools, &[]);
-    check("flat elements", found, [0xb930d0d371227786, 0xdc903f6431c8d73e, 0xa2b0a281ae86ac0f]);
+    check("flat elements", found, [0xbd5759e7cf847329, 0x2cb97c27f08a2397, 0xf5a74bf1cbfeb030]);
 }
 
 /// A spring of negative stiffness: the matrix has no Cholesky factor, and sweeps take over in the
@@ -220,5 +220,5 @@ fn fallback_to_sweeps() {
         jaws.stiffness = -30.0;
     }
     let found = hashes(&model, &state, 12, &lift_and_probe, &[]);
-    check("fallback to sweeps", found, [0xda886b56dd2eb6b1, 0x77f5de6435d096d2, 0xf99c2b40554a8313]);
+    check("fallback to sweeps", found, [0x7c924e0e7fbf450a, 0x77f5de6435d096d2, 0x3eb74a9b769ce2e1]);
 }

@@ -1,12 +1,12 @@
 //! Forces on nodes: Newton's second law, a pulled column against its analytic length, and contact
 //! that is repeated by its own forces.
 
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_testing::blocks::{self, FRAME, GRAVITY, block, model, nodes, schedules, tissue};
 use trocar_tissue::{
-    BodyContact, BodyDescription, Collider, Divergence, Load, Material, Model, ModelBuilder, Shape, SolverSettings,
-    State, Stepper, ToolMotion,
+    BodyContact, BodyDescription, Collider, ConstitutiveModel, Divergence, Load, Material, Model, ModelBuilder, Shape,
+    SolverSettings, State, Stepper, ToolMotion,
 };
 
 /// A free block whose nodes are pushed by their mass times an acceleration has that acceleration,
@@ -174,4 +174,63 @@ fn what_bodies_do_to_each_other_is_equal_and_opposite() {
     assert!(most < 0.01 * fall, "{:.5} mm in a frame; it would fall {:.5} mm", most * 1e3, fall * 1e3);
     let mut other = State::new(&model(&low, tissue(12e3), vec![], GRAVITY));
     assert!(!other.copy_motion(&a), "a state of other bodies is refused");
+}
+
+/// Stretch of a bar whose sides are free, under a nominal stress (Pa), by the material's textbook
+/// form: nested halving.
+fn stretch_under(material: &Material, nominal: f64) -> f64 {
+    let psi = material.hyperelastic();
+    let halve = |mut low: f64, mut high: f64, beyond: &dyn Fn(f64) -> bool| {
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            *(if beyond(middle) { &mut high } else { &mut low }) = middle;
+        }
+        0.5 * (low + high)
+    };
+    let stress = |s: f64| {
+        let at = |t: f64| psi.stress(DMat3::from_diagonal(DVec3::new(t, t, s)));
+        let t = halve(0.05, 1.2, &|t| at(t).x_axis.x > 0.0);
+        at(t).z_axis.z
+    };
+    halve(1.0, 12.0, &|s| stress(s) > nominal)
+}
+
+/// Soft tissue that is pulled with hundreds of times its shear modulus stretches as the limit of
+/// stretch says, and no element inverts. Without the limit it would be 200 times as long.
+#[test]
+fn stretch_is_limited() {
+    let edge = 2e-3;
+    // Sweeps see every element once for each corner, so their bar is thin.
+    for (schedule, width) in [(SolverSettings::FAST, 3), (blocks::adaptive(), 1)] {
+        let mesh = block([width, width, 8], edge);
+        let (length, side) = (8.0 * edge, width as f64 * edge);
+        let share = |p: DVec3| {
+            let part = |x: f64| if x < 1e-9 || x > side - 1e-9 { 0.5 } else { 1.0 };
+            part(p.x) * part(p.y) * edge * edge
+        };
+        let top = nodes(&mesh, |p| (p.z - length).abs() < 1e-9);
+        let [low, high] = [3.0, 6.0].map(|level| nodes(&mesh, |p| (p.z - level * edge).abs() < 1e-9));
+        for law in [ConstitutiveModel::StableNeoHookean, ConstitutiveModel::Corotated] {
+            let material = Material { model: law, viscosity: 40.0, ..tissue(3e3) };
+            let model = model(&mesh, material, nodes(&mesh, |p| p.z == 0.0), DVec3::ZERO);
+            let nominal = 200.0 * material.lame().0;
+            let expected = stretch_under(&material, nominal);
+            assert!((4.5..6.5).contains(&expected), "{law:?}: a stretch of {expected}");
+            let mut state = State::new(&model);
+            let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
+            for frame in 0..120 {
+                let pull = nominal * (f64::from(frame) / 60.0).min(1.0);
+                let force = |i: &u32| DVec3::Z * (pull * share(mesh.vertices[*i as usize]));
+                let loads: Vec<Load> =
+                    top.iter().map(|i| Load { body: 0, node: *i as usize, force: force(i) }).collect();
+                let report = stepper.step_with_loads(&model, &mut state, &[], &loads);
+                assert_eq!((report.divergence, report.inverted), (None, 0), "{law:?} {schedule:?} frame {frame}");
+                assert_eq!(report.fallbacks, 0, "{law:?} {schedule:?} frame {frame}");
+            }
+            let apart = state.centroid(&model, 0, &high).z - state.centroid(&model, 0, &low).z;
+            let stretch = apart / (3.0 * edge);
+            println!("{law:?} {schedule:?}: {stretch:.3}, expected {expected:.3}");
+            assert!((stretch / expected - 1.0).abs() < 0.02, "{law:?} {schedule:?}: {stretch}, not {expected}");
+        }
+    }
 }

@@ -1,10 +1,10 @@
 //! Materials: isotropic laws, split into a deviatoric and a volumetric part.
 //!
-//! Both parts are free of stress at rest. Their sum at the same F is the whole law. The linear
-//! deviatoric part is mu |dev e|^2, which no change of volume enters; the linear volumetric part is
-//! K/2 tr(e)^2. So the first is integrated at eight points and the second at one, without hourglass
-//! modes and without locking (Malkus and Hughes, "Mixed finite element methods - reduced and
-//! selective integration techniques", 1978).
+//! Both parts are free of stress at rest, and the deviatoric one limits large stretches. Their sum
+//! at the same F is the whole law. The linear deviatoric part is mu |dev e|^2, which no change of
+//! volume enters; the linear volumetric part is K/2 tr(e)^2. So the first is integrated at eight
+//! points and the second at one, without hourglass modes and without locking (Malkus and Hughes,
+//! "Mixed finite element methods - reduced and selective integration techniques", 1978).
 //!
 //! A law is a function of the signed singular values s of F. Its second derivative is diagonal in
 //! known modes, which allows an exact projection (Smith, De Goes and Kim, "Analytic eigensystems
@@ -12,9 +12,10 @@
 
 mod corotated;
 mod stable_neo_hookean;
+mod stretch;
 
-use crate::symmetric::{cofactor, eigen, nearest_rotation};
 use glam::{DMat3, DVec3};
+use trocar_geometry::symmetric::{cofactor, eigen, nearest_rotation};
 
 /// Constitutive law.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -77,6 +78,17 @@ impl Material {
 
     /// Energy density and stress dPsi/dF (Pa) of a part at F, without singular values.
     pub(crate) fn stress(&self, part: Part, f: DMat3) -> (f64, DMat3) {
+        let (energy, stress) = self.law_stress(part, f);
+        if part == Part::Volumetric {
+            return (energy, stress);
+        }
+        match stretch::limit(self.shear_modulus(), f) {
+            None => (energy, stress),
+            Some((limit, pull)) => (energy + limit, stress + pull),
+        }
+    }
+
+    fn law_stress(&self, part: Part, f: DMat3) -> (f64, DMat3) {
         let (mu, bulk) = (self.shear_modulus(), self.bulk_modulus());
         match self.law {
             Law::Corotated => {
@@ -106,12 +118,16 @@ impl Material {
 
     /// The energy density of a part at the singular values `s` of F, with its derivatives.
     pub(crate) fn at(&self, part: Part, s: DVec3) -> Principal {
-        match (self.law, part) {
+        let mut at = match (self.law, part) {
             (Law::Corotated, Part::Deviatoric) => corotated::deviatoric(self.shear_modulus(), s),
             (Law::Corotated, Part::Volumetric) => corotated::volumetric(self.bulk_modulus(), s),
             (Law::StableNeoHookean, Part::Deviatoric) => stable_neo_hookean::deviatoric(self.shear_modulus(), s),
             (Law::StableNeoHookean, Part::Volumetric) => stable_neo_hookean::volumetric(self.bulk_modulus(), s),
+        };
+        if part == Part::Deviatoric {
+            stretch::add(self.shear_modulus(), s, &mut at);
         }
+        at
     }
 }
 

@@ -1,5 +1,6 @@
 //! Vertex Block Descent of one body: predict, start, sweep, take the velocity.
 
+use super::stretched::StretchedElements;
 use super::sweep;
 use super::vertex_step::Substep;
 use crate::contact::ContactSet;
@@ -27,6 +28,8 @@ pub(crate) struct BodyDescent {
     loaded: bool,
     /// Whether another body presses it when a substep begins.
     pub pressed: bool,
+    /// Elements that may be stretched beyond the limit in the frame.
+    stretched: StretchedElements,
     isa: Isa,
     single_thread: bool,
 }
@@ -44,6 +47,7 @@ impl BodyDescent {
             held: vec![false; body.len()],
             loaded: false,
             pressed: false,
+            stretched: StretchedElements::default(),
             isa: Isa::detect(),
             single_thread,
         }
@@ -92,6 +96,7 @@ impl BodyDescent {
             predictor: &self.predictor,
             fixed: &self.fixed,
             contacts,
+            stretched: &self.stretched,
             isa: self.isa,
             single_thread: self.single_thread,
         };
@@ -138,8 +143,10 @@ impl BodyDescent {
         }
     }
 
-    /// Marks the vertices that are fixed during this frame.
-    pub fn begin_frame(&mut self, frame: &Frame<'_>, body: &Body) {
+    /// Marks the vertices that are fixed during this frame, and finds the elements that are
+    /// stretched far.
+    pub fn begin_frame(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState) {
+        self.stretched.find(body, &state.x);
         self.loaded = frame.loads.iter().any(|load| load.body == frame.index);
         self.held.fill(false);
         for grasp in frame.rigid_grasps() {

@@ -295,14 +295,14 @@ impl LaneSweep<'_> {
         store3::<S>(to, &mut memory.to, part);
     }
 
-    /// Vertices of a group that are in contact.
+    /// Vertices of a group that are in contact or in tissue that is stretched far.
     #[inline(always)]
     fn pressed(&self, group: &Group, x: &[Vec3A]) -> u16 {
-        let (contacts, first) = (self.substep.contacts, group.first as usize);
-        if !contacts.any(first..first + group.count as usize) {
+        let (Substep { contacts, stretched, .. }, first) = (self.substep, group.first as usize);
+        if !contacts.any(first..first + group.count as usize) && stretched.is_empty() {
             return 0;
         }
-        let pressed = |i: usize| contacts.of(i).any(|contact| contact.push(x[i]).is_some());
+        let pressed = |i: usize| contacts.of(i).any(|contact| contact.push(x[i]).is_some()) || stretched.any(i);
         (0..group.count as usize).fold(0, |lanes, lane| lanes | u16::from(pressed(first + lane)) << lane)
     }
 
@@ -324,11 +324,12 @@ impl LaneSweep<'_> {
         }
     }
 
-    /// Adds the parts that the plain sums lack in one lane: contacts, and the barrier in elements
-    /// of small volume.
+    /// Adds the parts that the plain sums lack in one lane: contacts, the limit of stretch, and the
+    /// barrier in elements of small volume.
     fn add_rare_to(&self, local: &mut Local, group: &Group, lane: usize, x: &[Vec3A], memory: &Memory) {
         let vertex = group.first as usize + lane;
         self.substep.add_contacts(vertex, x[vertex], local);
+        self.substep.stretched.add(vertex, x, local);
         for (step, face) in self.groups.steps_of(group).iter().zip(&memory.faces).skip(2) {
             let (inverse, ratio) = (step.inverse_6v.0[lane], face.ratio.0[lane]);
             if inverse != 0.0 && ratio <= VolumeTerm::MIN_PLAIN_RATIO {

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
 use super::kernel::Kernel;
+use super::stretched::StretchedElements;
 use super::vertex_step::Substep;
 use crate::contact::ContactSet;
 use crate::support::{SupportField, SupportPlane};
@@ -66,9 +67,14 @@ fn model(mesh: &TetMesh, viscosity: f64) -> Model {
 #[test]
 fn lanes_do_what_single_vertices_do() {
     let block = block(6);
-    for (mesh, viscosity, squeeze) in
-        [(&block, 0.0, 1.0), (&block, 60.0, 1.0), (&block, 0.0, 0.2), (&wheel(), 0.0, 1.0), (&wheel(), 60.0, 0.2)]
-    {
+    for (mesh, viscosity, squeeze) in [
+        (&block, 0.0, 1.0),
+        (&block, 60.0, 1.0),
+        (&block, 0.0, 0.2),
+        (&block, 0.0, 5.0),
+        (&wheel(), 0.0, 1.0),
+        (&wheel(), 60.0, 0.2),
+    ] {
         let model = model(mesh, viscosity);
         let body = &model.bodies[0];
         let mut rest = vec![Vec3A::ZERO; body.len()];
@@ -79,7 +85,8 @@ fn lanes_do_what_single_vertices_do() {
             let jolt = |(i, p): (usize, &Vec3A)| *p + (by * noise(i + seed)).as_vec3a();
             rest.iter().enumerate().map(jolt).collect()
         };
-        // Nearly flat elements meet the barrier, and large steps the guard.
+        // Nearly flat elements meet the barrier, large steps the guard, and long ones the limit of
+        // stretch.
         let squeezed = |p: &Vec3A| *p * Vec3A::new(1.0, 1.0, squeeze);
         let mut begin: Vec<Vec3A> = jolted(2e-5, 9).iter().map(squeezed).collect();
         begin[body.color_start[body.colors()] as usize..]
@@ -90,6 +97,8 @@ fn lanes_do_what_single_vertices_do() {
         let sweep = |isa| {
             let (start, predictor) = (jolted(1e-4, 200), jolted(2e-3, 400));
             let contacts = ContactSet::of_everything(body, &start);
+            let mut stretched = StretchedElements::default();
+            stretched.find(body, &begin);
             let substep = Substep {
                 body,
                 h: 1.0 / 480.0,
@@ -97,6 +106,7 @@ fn lanes_do_what_single_vertices_do() {
                 predictor: &predictor,
                 fixed: &fixed,
                 contacts: &contacts,
+                stretched: &stretched,
                 isa,
                 single_thread: false,
             };

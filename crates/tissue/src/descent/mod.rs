@@ -9,6 +9,7 @@ mod kernel;
 mod lane_sweep;
 #[cfg(test)]
 mod lane_tests;
+mod stretched;
 mod sweep;
 mod vertex_step;
 
@@ -45,7 +46,7 @@ impl Solver for TouchingDescent {
     fn begin_frame(island: &mut IslandFrame<'_, Self>) {
         let frame = island.frame;
         for BodySlot { index, body, solver, state, .. } in island.slots.iter_mut() {
-            solver.descent.begin_frame(&frame.of(*index), body);
+            solver.descent.begin_frame(&frame.of(*index), body, state);
             solver.contacts.begin_frame(&frame.of(*index), body, state);
         }
     }

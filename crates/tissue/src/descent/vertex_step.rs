@@ -6,6 +6,7 @@
 //! below a floor, and no element is ever inverted.
 
 use super::kernel::{Local, Seen, VertexElasticity, volume_gradient};
+use super::stretched::StretchedElements;
 use crate::Isa;
 use crate::body::Body;
 use crate::contact::ContactSet;
@@ -28,6 +29,8 @@ pub(crate) struct Substep<'a> {
     pub fixed: &'a [bool],
     /// Contacts of its vertices.
     pub contacts: &'a ContactSet,
+    /// Elements that may be stretched beyond the limit.
+    pub stretched: &'a StretchedElements,
     /// Instructions to use; all give the same bits.
     pub isa: Isa,
     /// Whether the calling thread does all the work.
@@ -72,6 +75,7 @@ impl Substep<'_> {
         let mut local = self.inertia(i, here);
         self.add_edges(i, here, x, &mut local);
         self.add_contacts(i, here, &mut local);
+        self.stretched.add(i, x, &mut local);
         let corners = self.body.corners_of(i);
         let first = corners.start;
         for k in corners {
@@ -217,8 +221,10 @@ mod tests {
         for (model, stretch) in [
             (ConstitutiveModel::StableNeoHookean, 1.0),
             (ConstitutiveModel::StableNeoHookean, 0.45),
+            (ConstitutiveModel::StableNeoHookean, 4.5),
             (ConstitutiveModel::StVenantKirchhoff, 1.4),
             (ConstitutiveModel::Corotated, 1.4),
+            (ConstitutiveModel::Corotated, 4.5),
         ] {
             let material =
                 Material { model, young_modulus: 12e3, poisson_ratio: 0.45, density: 1200.0, viscosity: 4.0 };
@@ -237,6 +243,8 @@ mod tests {
             let x: Vec<DVec3> = rest.iter().enumerate().map(|(i, p)| stretch * p + moved(i, 1e-4)).collect();
             let to_f32 = |x: &[DVec3]| -> Vec<Vec3A> { x.iter().map(|p| p.as_vec3a()).collect() };
             let predictor: Vec<DVec3> = x.iter().enumerate().map(|(i, p)| p + moved(i + 7, 1e-4)).collect();
+            let mut stretched = StretchedElements::default();
+            stretched.find(body, &to_f32(&x));
             let substep = Substep {
                 body,
                 h: 1.0 / 480.0,
@@ -244,6 +252,7 @@ mod tests {
                 predictor: &to_f32(&predictor),
                 fixed: &[false; 6],
                 contacts: &ContactSet::of_everything(body, &to_f32(&rest)),
+                stretched: &stretched,
                 isa: Isa::detect(),
                 single_thread: false,
             };

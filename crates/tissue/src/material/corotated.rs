@@ -1,8 +1,10 @@
 //! Fixed corotated elasticity.
 
 use super::Hyperelastic;
-use super::volume::{VolumeEnergy, cofactor, dot, trace};
+use super::stretch::StretchEnergy;
+use super::volume::{VolumeEnergy, dot, trace};
 use glam::{DMat3, DVec3};
+use trocar_geometry::symmetric::cofactor;
 
 /// Psi = mu |F - R|^2 + lambda/2 (J - 1)^2, R being the rotation in F = R S.
 ///
@@ -10,8 +12,8 @@ use glam::{DMat3, DVec3};
 /// section 3.3 (their fixed corotated model). Small strains obey Hooke's law with Lame's mu and
 /// lambda exactly, and pure shape change costs what linear elasticity says at any rotation. Like
 /// [`super::StableNeoHookean`] it is finite for flat elements, so it has the same barrier below a
-/// fifth of the rest volume, with (lambda + mu)/20 ln(J/0.2)^2. It is not defined for inverted
-/// elements, which no solver here produces.
+/// fifth of the rest volume, with (lambda + mu)/2 ln(J/0.2)^2, and the same limit of stretch. It is
+/// not defined for inverted elements, which no solver here produces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corotated {
     /// Lame's mu (Pa).
@@ -29,16 +31,21 @@ impl Corotated {
     pub(crate) fn volume(&self) -> VolumeEnergy {
         VolumeEnergy::new(self.lambda, 1.0, self.lambda + self.mu)
     }
+
+    /// The energy of large stretches.
+    fn limit(&self) -> StretchEnergy {
+        StretchEnergy { mu: self.mu }
+    }
 }
 
 impl Hyperelastic for Corotated {
     fn energy(&self, f: DMat3) -> f64 {
         let strain = f - rotation(f);
-        self.mu * dot(strain, strain) + self.volume().at(f.determinant()).0
+        self.mu * dot(strain, strain) + self.volume().at(f.determinant()).0 + self.limit().energy(f)
     }
 
     fn stress(&self, f: DMat3) -> DMat3 {
-        (f - rotation(f)) * (2.0 * self.mu) + self.volume().stress(f)
+        (f - rotation(f)) * (2.0 * self.mu) + self.volume().stress(f) + self.limit().stress(f)
     }
 
     /// The rotation itself changes by R skew(w) with (tr(S) I - S) w = axial(R'dF - dF'R) (McAdams
@@ -51,7 +58,9 @@ impl Hyperelastic for Corotated {
         let axial = DVec3::new(skew.y_axis.z, skew.z_axis.x, skew.x_axis.y);
         let w = (DMat3::from_diagonal(DVec3::splat(trace(s))) - s).inverse() * axial;
         let spin = DMat3::from_cols(w.cross(DVec3::X), w.cross(DVec3::Y), w.cross(DVec3::Z));
-        (change - r * spin) * (2.0 * self.mu) + self.volume().stress_change(f, change)
+        (change - r * spin) * (2.0 * self.mu)
+            + self.volume().stress_change(f, change)
+            + self.limit().stress_change(f, change)
     }
 }
 

@@ -7,11 +7,13 @@
 mod corotated;
 mod st_venant_kirchhoff;
 mod stable_neo_hookean;
+mod stretch;
 mod volume;
 
 pub use corotated::Corotated;
 pub use st_venant_kirchhoff::StVenantKirchhoff;
 pub use stable_neo_hookean::StableNeoHookean;
+pub(crate) use stretch::{MAX_FREE_STRETCH_SQUARED, StretchEnergy, Stretches};
 pub(crate) use volume::VolumeEnergy;
 
 use glam::DMat3;
@@ -77,6 +79,12 @@ impl Material {
         (e / (2.0 * (1.0 + nu)), e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)))
     }
 
+    /// The part of the energy that limits large stretches; None if the material stiffens by itself.
+    pub(crate) fn stretch_energy(&self) -> Option<StretchEnergy> {
+        let stiffens = self.model == ConstitutiveModel::StVenantKirchhoff;
+        (!stiffens).then(|| StretchEnergy { mu: self.lame().0 })
+    }
+
     /// The material's energy.
     pub fn hyperelastic(&self) -> Box<dyn Hyperelastic> {
         let (mu, lambda) = self.lame();
@@ -98,8 +106,8 @@ mod tests {
     }
 
     /// Some deformation gradients: near rest, sheared, squeezed, stretched, squeezed into the
-    /// volume barrier.
-    fn deformations() -> [DMat3; 5] {
+    /// volume barrier, stretched beyond the limit.
+    fn deformations() -> [DMat3; 6] {
         let skew =
             DMat3::from_cols(DVec3::new(1.1, 0.2, -0.1), DVec3::new(-0.3, 0.8, 0.25), DVec3::new(0.05, -0.2, 1.3));
         [
@@ -108,6 +116,7 @@ mod tests {
             DMat3::from_diagonal(DVec3::new(0.4, 1.2, 1.1)) * skew,
             DMat3::from_diagonal(DVec3::new(2.5, 0.7, 0.6)),
             DMat3::from_diagonal(DVec3::new(0.3, 0.4, 1.0)) * skew,
+            DMat3::from_diagonal(DVec3::new(5.0, 0.5, 0.6)) * skew,
         ]
     }
 

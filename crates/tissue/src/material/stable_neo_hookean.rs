@@ -1,6 +1,7 @@
 //! Stable neo-Hookean elasticity.
 
 use super::Hyperelastic;
+use super::stretch::StretchEnergy;
 use super::volume::VolumeEnergy;
 use glam::DMat3;
 
@@ -8,8 +9,9 @@ use glam::DMat3;
 ///
 /// Smith, De Goes and Kim, "Stable neo-Hookean flesh simulation", 2018, without the logarithmic
 /// term, which only matters at the origin of F. The energy is finite for flat elements, though, and
-/// an element between a rigid grasp and pinned tissue can be pulled flat; so a barrier lambda'/20
-/// ln(J/0.2)^2 is added below a fifth of the rest volume. The linearisation at rest is 2 mu eps +
+/// an element between a rigid grasp and pinned tissue can be pulled flat; so a barrier lambda'/2
+/// ln(J/0.2)^2 is added below a fifth of the rest volume. Beyond a stretch of 4 tissue becomes
+/// stiff: mu/2 (s^2 - 16)^2 is added for each principal stretch s there. The linearisation at rest is 2 mu eps +
 /// (lambda' - mu) tr(eps) I, so lambda' = lambda + mu makes small strains obey Hooke's law with
 /// Lame's mu and lambda exactly.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,19 +42,25 @@ impl StableNeoHookean {
     pub(crate) fn volume(&self) -> VolumeEnergy {
         VolumeEnergy::new(self.lambda, self.alpha, self.lambda)
     }
+
+    /// The energy of large stretches.
+    fn limit(&self) -> StretchEnergy {
+        StretchEnergy { mu: self.mu }
+    }
 }
 
 impl Hyperelastic for StableNeoHookean {
     fn energy(&self, f: DMat3) -> f64 {
         let trace = f.to_cols_array().iter().map(|x| x * x).sum::<f64>();
         0.5 * self.mu * (trace - 3.0) + self.volume_term(f.determinant()).0 - self.volume_term(1.0).0
+            + self.limit().energy(f)
     }
 
     fn stress(&self, f: DMat3) -> DMat3 {
-        f * self.mu + self.volume().stress(f)
+        f * self.mu + self.volume().stress(f) + self.limit().stress(f)
     }
 
     fn stress_change(&self, f: DMat3, change: DMat3) -> DMat3 {
-        change * self.mu + self.volume().stress_change(f, change)
+        change * self.mu + self.volume().stress_change(f, change) + self.limit().stress_change(f, change)
     }
 }

@@ -2,6 +2,7 @@
 //! the volume ratio J = det F.
 
 use glam::DMat3;
+use trocar_geometry::symmetric::cofactor;
 
 /// Volume ratio below which the barrier acts, and its strength over the material's volume modulus.
 const BARRIER_BEGINS: f64 = 0.2;
@@ -50,12 +51,6 @@ impl VolumeEnergy {
         let cofactor = cofactor(f);
         cofactor * (curvature * dot(cofactor, change)) + cofactor_change(f, change) * slope
     }
-}
-
-/// The cofactor matrix dJ/dF.
-pub(crate) fn cofactor(f: DMat3) -> DMat3 {
-    let [a, b, c] = [f.x_axis, f.y_axis, f.z_axis];
-    DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b))
 }
 
 /// First-order change of the cofactor matrix when F changes by `change`.

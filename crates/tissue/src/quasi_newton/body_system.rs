@@ -236,11 +236,11 @@ impl QuasiNewtonSolver {
         self.system.update_warp(self.level, &self.layout, &self.iterate.x);
     }
 
-    /// Updates the system for the elements that are squeezed where the nodes are. The contacts are
+    /// Updates the system for the elements that are stiffened where the nodes are. The contacts are
     /// to be updated after it.
-    pub fn update_squeezed(&mut self) {
+    pub fn update_stiffened(&mut self) {
         let Self { level, system, layout, elements, held, iterate, .. } = self;
-        system.update_squeezed(*level, layout, elements, held, &iterate.x);
+        system.update_stiffened(*level, layout, elements, held, &iterate.x);
     }
 
     /// Updates the system for the contacts that press where the nodes are.

@@ -2,21 +2,27 @@
 
 use super::iterate::Iterate;
 use super::layout::{Batch, Layout};
-use super::stress::Stress;
+use super::stress::{Stress, add_limit};
 use crate::Body;
 use crate::inversion_guard::{KEPT_SHARE, MIN_SQUARED_LENGTH, MIN_VOLUME_RATIO, is_squeezed};
 use crate::lanes::{LANES, Mat3L, Row, Vec3L, add, apply, cross, dot, gather, load, scale, splat, store_rows, sub};
+use crate::material::{MAX_FREE_STRETCH_SQUARED, StretchEnergy};
 use fearless_simd::{Level, Simd, SimdBase, dispatch, f32x16};
 use std::collections::BTreeMap;
 
 /// Forces and volume ratios of the elements.
 pub(super) struct Elements {
     pub stress: Stress,
+    /// What limits large stretches.
+    pub limit: Option<StretchEnergy>,
     /// Gradient of the energy by each corner's position (N), batch by batch, corner by corner.
     pub corners: Vec<Row>,
     /// Volume ratios at the accepted positions, and at those of the last evaluation.
     pub ratios: Vec<[f32; LANES]>,
     pub trial: Vec<[f32; LANES]>,
+    /// Whether an element may have been stretched beyond the limit in an evaluation since the
+    /// stiffened elements were last sought in vain.
+    pub stretched: bool,
     /// Each element's part of the dashpots along its edges (N s/m); empty without viscosity.
     dashpots: Vec<[[f32; LANES]; 6]>,
     /// Whether the last evaluation was of a body at rest, by `evaluate_in_place`.
@@ -28,9 +34,11 @@ impl Elements {
         let batches = layout.batches.len();
         Self {
             stress: Stress::of(&body.material),
+            limit: body.material.stretch_energy(),
             corners: vec![[0.0; 4]; batches * 4 * LANES],
             ratios: vec![[1.0; LANES]; batches],
             trial: vec![[1.0; LANES]; batches],
+            stretched: false,
             dashpots: if body.material.viscosity > 0.0 { dashpots(layout, body) } else { Vec::new() },
             in_place: false,
         }
@@ -66,6 +74,13 @@ impl Elements {
             ratio.store_slice(&mut self.trial[b]);
             squeezed = simd.max_f32x16(squeezed, lack(simd, ratio, load(simd, &self.ratios[b])));
             let mut p = self.stress.at(simd, &f, ratio);
+            let square = dot(f[0], f[0]) + dot(f[1], f[1]) + dot(f[2], f[2]);
+            if simd.any_true_mask32x16(simd.simd_gt_f32x16(square, splat(simd, MAX_FREE_STRETCH_SQUARED as f32))) {
+                if let Some(limit) = &self.limit {
+                    self.stretched = true;
+                    add_limit(simd, limit, &f, &mut p);
+                }
+            }
             let volume = load(simd, &batch.volumes);
             for c in 0..3 {
                 p[c] = scale(p[c], volume);

@@ -1,5 +1,5 @@
-//! Contacts that began or ended since the matrix was factorised, and squeezed elements, as a
-//! low-rank update of its inverse.
+//! Contacts that began or ended since the matrix was factorised, and elements that are
+//! far stiffer than at rest, as a low-rank update of its inverse.
 //!
 //! The factor contains the stiffness of the nodes that pressed when it was made. New and lost
 //! contacts differ from it by a stiffness on a few nodes: a matrix of low rank. By Woodbury's
@@ -8,20 +8,20 @@
 //! then costs three products with vectors. The stiffness is the same in all directions, so the
 //! columns are kept in the tissue's rest frame and stay valid however it turns.
 //!
-//! A squeezed element has one direction and one column, which is solved for in every substep.
+//! A stiffened element has one direction and one column, which is solved for in every substep.
 
 use super::factor::Factor;
-use super::squeezed::{MAX_SQUEEZED, Squeezed};
+use super::stiffened::{MAX_STIFFENED, Stiffened};
 use fearless_simd::Simd;
 
 /// Greatest number of nodes in the update.
 const MAX_NODES: usize = 16;
 
 /// Greatest number of directions in the update.
-const MAX_DIRECTIONS: usize = 3 * MAX_NODES + MAX_SQUEEZED;
+const MAX_DIRECTIONS: usize = 3 * MAX_NODES + MAX_STIFFENED;
 
 /// The difference between the matrix now and the factor. Its directions are three of each node,
-/// then one of each squeezed element.
+/// then one of each stiffened element.
 pub(super) struct LowRankUpdate {
     /// Nodes and the stiffness that is added (N/m); those whose stiffness is taken out of the
     /// factor come first.
@@ -32,9 +32,9 @@ pub(super) struct LowRankUpdate {
     /// Nodes whose columns of the factor's inverse are known, and three columns of each.
     known: Vec<u32>,
     columns: Vec<f32>,
-    /// Elements that are squeezed, gradients in the rest frame, and a column of each.
-    squeezed: Vec<Squeezed>,
-    squeezed_columns: Vec<f32>,
+    /// Elements that are stiffened, gradients in the rest frame, and a column of each.
+    stiffened: Vec<Stiffened>,
+    stiffened_columns: Vec<f32>,
     /// Whether the elements have changed since the matrix was made.
     stale: bool,
     /// Numbers of a column.
@@ -57,8 +57,8 @@ impl LowRankUpdate {
             known: Vec::with_capacity(MAX_NODES),
             // Zeros take no memory until a column is written.
             columns: vec![0.0; 3 * MAX_NODES * length],
-            squeezed: Vec::with_capacity(MAX_SQUEEZED),
-            squeezed_columns: vec![0.0; MAX_SQUEEZED * length],
+            stiffened: Vec::with_capacity(MAX_STIFFENED),
+            stiffened_columns: vec![0.0; MAX_STIFFENED * length],
             stale: false,
             length,
             matrix: vec![0.0; MAX_DIRECTIONS * MAX_DIRECTIONS],
@@ -73,17 +73,17 @@ impl LowRankUpdate {
         self.reset();
     }
 
-    /// Makes the update empty: the contacts are those in the factor, and no element is squeezed.
+    /// Makes the update empty: the contacts are those in the factor, and no element is stiffened.
     pub fn reset(&mut self) {
         self.nodes.clear();
-        self.squeezed.clear();
+        self.stiffened.clear();
         (self.usable, self.stale) = (false, false);
     }
 
-    /// Takes the squeezed elements out.
-    pub fn forget_squeezed(&mut self) {
-        if !self.squeezed.is_empty() {
-            self.squeezed.clear();
+    /// Takes the stiffened elements out.
+    pub fn forget_stiffened(&mut self) {
+        if !self.stiffened.is_empty() {
+            self.stiffened.clear();
             self.usable = self.factorise();
         }
     }
@@ -121,16 +121,16 @@ impl LowRankUpdate {
         self.usable = self.factorise();
     }
 
-    /// Sets the squeezed elements, gradients in the rest frame, at most [`MAX_SQUEEZED`]. The nodes
-    /// are to be set after it.
+    /// Sets the stiffened elements, gradients in the rest frame, at most [`MAX_STIFFENED`]. The
+    /// nodes are to be set after it.
     #[inline(always)]
-    pub fn set_squeezed<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32], squeezed: &[Squeezed]) {
-        if self.squeezed == squeezed {
+    pub fn set_stiffened<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32], found: &[Stiffened]) {
+        if self.stiffened == found {
             return;
         }
-        self.squeezed.clear();
-        self.squeezed.extend_from_slice(squeezed);
-        for (element, column) in squeezed.iter().zip(self.squeezed_columns.chunks_exact_mut(self.length)) {
+        self.stiffened.clear();
+        self.stiffened.extend_from_slice(found);
+        for (element, column) in found.iter().zip(self.stiffened_columns.chunks_exact_mut(self.length)) {
             scratch.fill(0.0);
             for (node, g) in element.nodes.iter().zip(&element.gradient) {
                 (0..3).for_each(|c| scratch[3 * *node as usize + c] += g[c]);
@@ -174,7 +174,7 @@ impl LowRankUpdate {
     fn product(&self, i: usize, x: &[f32]) -> f64 {
         match i.checked_sub(3 * self.nodes.len()) {
             None => f64::from(x[3 * self.nodes[i / 3].0 as usize + i % 3]),
-            Some(e) => self.squeezed[e].product(x),
+            Some(e) => self.stiffened[e].product(x),
         }
     }
 
@@ -182,7 +182,7 @@ impl LowRankUpdate {
     fn stiffness(&self, i: usize) -> f64 {
         f64::from(match i.checked_sub(3 * self.nodes.len()) {
             None => self.nodes[i / 3].1,
-            Some(e) => self.squeezed[e].stiffness,
+            Some(e) => self.stiffened[e].stiffness,
         })
     }
 
@@ -190,14 +190,14 @@ impl LowRankUpdate {
     fn column(&self, i: usize) -> &[f32] {
         match i.checked_sub(3 * self.nodes.len()) {
             None => &self.columns[(3 * self.places[i / 3] + i % 3) * self.length..][..self.length],
-            Some(e) => &self.squeezed_columns[e * self.length..][..self.length],
+            Some(e) => &self.stiffened_columns[e * self.length..][..self.length],
         }
     }
 
     /// Builds the matrix of the directions and its L D L'. False if the sum is not positive
     /// definite.
     fn factorise(&mut self) -> bool {
-        let n = 3 * self.nodes.len() + self.squeezed.len();
+        let n = 3 * self.nodes.len() + self.stiffened.len();
         for j in 0..n {
             for i in j..n {
                 self.matrix[i * n + j] = self.product(i, self.column(j));
@@ -228,7 +228,7 @@ impl LowRankUpdate {
             return;
         }
         let of_nodes = 3 * self.nodes.len();
-        let n = of_nodes + self.squeezed.len();
+        let n = of_nodes + self.stiffened.len();
         for i in 0..n {
             let known: f64 = (0..i).map(|k| self.matrix[i * n + k] * self.shares[k]).sum();
             self.shares[i] = self.product(i, x) - known;
@@ -239,7 +239,7 @@ impl LowRankUpdate {
             shares[i] = shares[i] / matrix[i * n + i] - known;
         }
         let x = &mut x[..self.length];
-        let (shares, of_squeezed) = shares.split_at(of_nodes);
+        let (shares, of_stiffened) = shares.split_at(of_nodes);
         for (place, shares) in self.places.iter().zip(shares.chunks_exact(3)) {
             let columns = &self.columns[3 * place * self.length..3 * (place + 1) * self.length];
             let (a, rest) = columns.split_at(self.length);
@@ -249,7 +249,7 @@ impl LowRankUpdate {
                 *x -= s * a + t * b + u * c;
             }
         }
-        for (column, share) in self.squeezed_columns.chunks_exact(self.length).zip(of_squeezed) {
+        for (column, share) in self.stiffened_columns.chunks_exact(self.length).zip(of_stiffened) {
             let share = *share as f32;
             x.iter_mut().zip(column).for_each(|(x, c)| *x -= share * c);
         }

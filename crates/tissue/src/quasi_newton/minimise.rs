@@ -34,7 +34,7 @@ impl IslandSystem<'_> {
         self.choose_active(alone);
         self.for_active(|body| {
             if body.progress.guess != InitialGuess::Still {
-                body.update_squeezed();
+                body.update_stiffened();
                 body.update_contacts();
             }
         });

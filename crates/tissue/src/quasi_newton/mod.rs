@@ -32,7 +32,7 @@ mod resting;
 mod rigid_modes;
 mod sleep;
 mod sleeping;
-mod squeezed;
+mod stiffened;
 mod stress;
 mod system;
 mod tiles;
@@ -152,8 +152,8 @@ impl IslandSystem<'_> {
     fn sweep(&mut self, to: f64) {
         for slot in self.slots.iter_mut() {
             slot.report.fallbacks += 1;
-            slot.solver.fallback.begin_frame(&self.frame.of(slot.index), &slot.body);
             slot.solver.iterate.store(&slot.solver.layout, &mut slot.state);
+            slot.solver.fallback.begin_frame(&self.frame.of(slot.index), &slot.body, &slot.state);
         }
         sweep_substep(self.slots, self.pairs, self.frame, to);
         for BodySlot { solver, state, .. } in self.slots.iter_mut() {

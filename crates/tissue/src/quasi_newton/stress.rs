@@ -1,9 +1,10 @@
 //! Stresses of sixteen elements at once.
 
 use crate::lanes::{LANES, Mat3L, add, apply, cofactor, dot, load, rotation, scale, splat, sub};
-use crate::material::VolumeEnergy;
+use crate::material::{StretchEnergy, VolumeEnergy};
 use crate::{ConstitutiveModel, Corotated, Material, StableNeoHookean};
 use fearless_simd::{Simd, SimdBase, f32x16};
+use glam::DMat3;
 
 /// Volume ratio above which the volume energy is its plain quadratic.
 const MIN_PLAIN_RATIO: f32 = 0.25;
@@ -62,7 +63,7 @@ impl Stress {
         }
     }
 
-    /// First Piola-Kirchhoff stress of F, whose determinant is `ratio`.
+    /// First Piola-Kirchhoff stress of F, whose determinant is `ratio`, without [`add_limit`].
     #[inline(always)]
     pub fn at<S: Simd>(&self, simd: S, f: &Mat3L<S>, ratio: f32x16<S>) -> Mat3L<S> {
         match self {
@@ -123,6 +124,30 @@ impl Volume {
         }
         load(simd, &slopes)
     }
+}
+
+/// Adds to the stress of F what limits large stretches, in the lanes where it acts.
+#[cold]
+#[inline(never)]
+pub(super) fn add_limit<S: Simd>(simd: S, limit: &StretchEnergy, f: &Mat3L<S>, p: &mut Mat3L<S>) {
+    let stored = |m: &Mat3L<S>| {
+        m.map(|column| {
+            column.map(|entries| {
+                let mut numbers = [0.0f32; LANES];
+                entries.store_slice(&mut numbers);
+                numbers
+            })
+        })
+    };
+    let (f, mut sum) = (stored(f), stored(p));
+    for lane in 0..LANES {
+        let f = DMat3::from_cols_array_2d(&f.map(|column| column.map(|numbers| f64::from(numbers[lane]))));
+        let part = limit.stress(f).to_cols_array_2d();
+        for (sum, part) in sum.as_flattened_mut().iter_mut().zip(part.as_flattened()) {
+            sum[lane] += *part as f32;
+        }
+    }
+    *p = sum.map(|column| column.map(|numbers| load(simd, &numbers)));
 }
 
 /// Green's strain (F'F - I)/2: xx, yy, zz, xy, yz, zx.

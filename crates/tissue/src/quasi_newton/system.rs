@@ -6,7 +6,7 @@ use super::factor::Factor;
 use super::iterate::{add, position};
 use super::layout::Layout;
 use super::low_rank_update::LowRankUpdate;
-use super::squeezed::{MAX_SQUEEZED, Squeezed};
+use super::stiffened::{MAX_STIFFENED, Stiffened};
 use super::warp::Warp;
 use crate::Body;
 use crate::contact::ContactSet;
@@ -19,7 +19,7 @@ use glam::{Mat3A, Vec3A};
 pub(super) struct System {
     /// None if no node is free.
     factor: Option<Factor>,
-    /// Contacts and stiffness of squeezed elements that are not in the factor, or no longer there.
+    /// Contacts and stiffness of stiffened elements that are not in the factor, or no longer there.
     update: LowRankUpdate,
     warp: Warp,
     /// Nodes that press in the factor, and their stiffness (N/m); negative where they no longer do.
@@ -32,8 +32,8 @@ pub(super) struct System {
     pub usable: bool,
     /// Scratch: stiffness of what presses each free node now (N/m).
     pressing: Vec<f32>,
-    /// Scratch: the squeezed elements.
-    squeezed: Vec<Squeezed>,
+    /// Scratch: the stiffened elements.
+    stiffened: Vec<Stiffened>,
     /// Scratch: the vector of a solve.
     right: Vec<f32>,
 }
@@ -59,7 +59,7 @@ impl System {
             held,
             contacts,
             pressing: vec![0.0; layout.free],
-            squeezed: Vec::with_capacity(MAX_SQUEEZED),
+            stiffened: Vec::with_capacity(MAX_STIFFENED),
             right: vec![0.0; 3 * layout.rows + 16],
             factor,
         };
@@ -99,27 +99,34 @@ impl System {
         stale
     }
 
-    /// Begins a substep: the contacts are those in the factor, and no element is squeezed.
+    /// Begins a substep: the contacts are those in the factor, and no element is stiffened.
     pub fn reset_update(&mut self) {
         self.update.reset();
     }
 
-    /// Updates the inverse for the elements that are squeezed at the positions `x`. The contacts
+    /// Updates the inverse for the elements that are stiffened at the positions `x`. The contacts
     /// are to be updated after it.
-    pub fn update_squeezed(&mut self, level: Level, layout: &Layout, elements: &Elements, held: &[bool], x: &[Row]) {
-        let Self { factor: Some(factor), update, warp, squeezed, right, .. } = self else { return };
-        elements.find_squeezed(layout, x, held, squeezed);
-        for element in squeezed.iter_mut() {
+    pub fn update_stiffened(
+        &mut self,
+        level: Level,
+        layout: &Layout,
+        elements: &mut Elements,
+        held: &[bool],
+        x: &[Row],
+    ) {
+        let Self { factor: Some(factor), update, warp, stiffened, right, .. } = self else { return };
+        elements.find_stiffened(layout, x, held, stiffened);
+        for element in stiffened.iter_mut() {
             for (node, g) in element.nodes.iter().zip(&mut element.gradient) {
                 *g = warp.turn_back(*node, *g);
             }
         }
-        dispatch!(level, simd => update.set_squeezed(simd, factor, right, squeezed));
+        dispatch!(level, simd => update.set_stiffened(simd, factor, right, stiffened));
     }
 
-    /// Takes the squeezed elements out of the inverse.
-    pub fn forget_squeezed(&mut self) {
-        self.update.forget_squeezed();
+    /// Takes the stiffened elements out of the inverse.
+    pub fn forget_stiffened(&mut self) {
+        self.update.forget_stiffened();
     }
 
     /// Updates the inverse for the contacts that press at the positions `x`.

@@ -59,7 +59,7 @@ impl QuasiNewtonSolver {
     /// (N m), columns are translation (m) and rotation (rad).
     pub(super) fn add_stiffness(&mut self, body: &Body, group: &ToolGroup<'_>, sum: &mut [[f64; 6]; 6]) {
         // Elements are as stiff as at rest.
-        self.system.forget_squeezed();
+        self.system.forget_stiffened();
         let springs = self.springs(body, group);
         if !springs.iter().any(Spring::moves) {
             return;

@@ -1,4 +1,5 @@
 //! Eigenvalues and singular values of 3x3 matrices, by Jacobi's rotations; their nearest rotations.
+//! Only sums, products, quotients and roots are used: the bits are the same on every machine.
 
 use glam::{DMat3, DVec3};
 
@@ -26,13 +27,15 @@ fn turn(m: &mut DMat3, [i, j]: [usize; 2], (cosine, sine): (f64, f64)) {
 
 /// Eigenvalues and the rotation whose columns are the eigenvectors of a symmetric matrix, in no
 /// particular order.
-pub(crate) fn eigen(matrix: DMat3) -> (DVec3, DMat3) {
+pub fn eigen(matrix: DMat3) -> (DVec3, DMat3) {
     let (mut m, mut axes) = (matrix, DMat3::IDENTITY);
+    // Rounding leaves about this much beside the diagonal.
+    let rounding = f64::EPSILON * matrix.to_cols_array().iter().map(|x| x.abs()).fold(0.0, f64::max);
     for _ in 0..MAX_SWEEPS {
         let mut turned = false;
         for [i, j] in PAIRS {
             let (a, b, c) = (m.col(i)[i], m.col(j)[j], m.col(j)[i]);
-            if c.abs() > f64::EPSILON * 0.01 * (a.abs() + b.abs()) {
+            if c.abs() > rounding {
                 let by = rotation(a, b, c);
                 turn(&mut m, [i, j], by);
                 m = m.transpose();
@@ -51,9 +54,12 @@ pub(crate) fn eigen(matrix: DMat3) -> (DVec3, DMat3) {
 /// F = U diag(s) V^T with rotations U and V. The values descend; only the last may be negative, and
 /// is if F inverts (Irving, Teran and Fedkiw, "Invertible finite elements", 2004).
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Svd {
+pub struct Svd {
+    /// The left rotation U.
     pub u: DMat3,
+    /// The singular values s.
     pub s: DVec3,
+    /// The right rotation V.
     pub v: DMat3,
 }
 
@@ -103,7 +109,7 @@ const POLAR_MIN_VOLUME: f64 = 1e-3;
 
 /// The rotation nearest to F: Newton's iteration of Higham, "Computing the polar decomposition -
 /// with applications", 1986.
-pub(crate) fn nearest_rotation(f: DMat3) -> DMat3 {
+pub fn nearest_rotation(f: DMat3) -> DMat3 {
     let norm = f.to_cols_array().iter().map(|e| e * e).sum::<f64>().sqrt();
     let volume = f.determinant();
     if volume > POLAR_MIN_VOLUME * norm.powi(3) {
@@ -122,7 +128,7 @@ pub(crate) fn nearest_rotation(f: DMat3) -> DMat3 {
 }
 
 /// The cofactor matrix, det(F) F^-T.
-pub(crate) fn cofactor(f: DMat3) -> DMat3 {
+pub fn cofactor(f: DMat3) -> DMat3 {
     let [a, b, c] = [f.x_axis, f.y_axis, f.z_axis];
     DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b))
 }
