@@ -130,7 +130,7 @@ fn a_replay_draws_nothing() {
     // Files of earlier versions are refused in a line.
     let bytes = std::fs::read(&path).unwrap();
     let end = bytes.iter().position(|b| *b == b'\n').unwrap();
-    let header = String::from_utf8(bytes[..end].to_vec()).unwrap().replace("\"version\":6", "\"version\":5");
+    let header = String::from_utf8(bytes[..end].to_vec()).unwrap().replace("\"version\":7", "\"version\":6");
     let said = EpisodeFile::parse(&[header.as_bytes(), &bytes[end..]].concat()).unwrap_err();
-    assert!(said.contains("version 5; trocar-episode version 7 is read"), "{said}");
+    assert!(said.contains("version 6; trocar-episode version 7 is read"), "{said}");
 }
