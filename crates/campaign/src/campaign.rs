@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use trocar_core::{Progress, Silent};
-use trocar_scene::{Scene, Split, VariationSet};
+use trocar_scene::{BackendName, Scene, Split, VariationSet};
 use trocar_workflow::{Error, Result, SpecimenCache, drawn_specimens, read_varied, refuse_overlap};
 
 /// Maximum number of parallel episodes per core. Each has its own cell in memory.
@@ -44,6 +44,7 @@ pub const DEFAULT_VARIATION: VariationSet = VariationSet::Standard;
 ///     split: Default::default(),
 ///     seed: 0,
 ///     variation: None,
+///     backend: None,
 ///     by: Vec::new(),
 ///     jobs: 1,
 ///     retry_failed: false,
@@ -71,6 +72,8 @@ pub struct Campaign {
     /// The set of factors that vary between episodes, instead of the scene's. Without one, a scene
     /// that has no set varies by [`DEFAULT_VARIATION`].
     pub variation: Option<VariationSet>,
+    /// What bears the tissue, instead of the scene's backend.
+    pub backend: Option<BackendName>,
     /// By what success is shown: factors, groups, drawn numbers; everything that varies if empty.
     pub by: Vec<String>,
     /// Number of parallel episodes; 0 for one per core. Results do not depend on it.
@@ -108,7 +111,10 @@ impl Campaign {
         max_episodes: Option<usize>,
         progress: &dyn Progress,
     ) -> Result<(Store, Manifest, Vec<By>)> {
-        let scene = read_varied(&self.scene, self.variation, DEFAULT_VARIATION)?;
+        let mut scene = read_varied(&self.scene, self.variation, DEFAULT_VARIATION)?;
+        if let Some(backend) = self.backend {
+            scene.tissue = scene.tissue.on(backend);
+        }
         refuse_overlap(Path::new(&self.scene), output)?;
         // Making a specimen takes minutes, so everything that does not need it is checked first.
         manifest::check(&self.policies, self.episodes, self.seed, max_episodes)?;

@@ -6,6 +6,8 @@
 //! the Python package distributes them over several. The bits of an episode depend only on scene,
 //! specimen, policy and seed, and not on the worker or the order.
 
+mod agreement;
+mod backends;
 mod bars;
 mod by;
 mod campaign;
@@ -27,6 +29,8 @@ mod variation_page;
 mod videos;
 mod worker;
 
+pub use agreement::Agreement;
+pub use backends::{BackendsResult, OfBackend};
 pub use by::{By, Value};
 pub use campaign::{Campaign, DEFAULT_VARIATION};
 pub use curves::{Bin, Curve, Share, significant};
@@ -38,6 +42,7 @@ pub use outcomes::{distinct_outcomes, repeats};
 pub use plots::{lift_and_rcm, lifts, success_by_name, success_over};
 pub use policy_server::interpreter;
 pub use policy_spec::PolicySpec;
+pub use remote::check_servers;
 pub use store::{EpisodeFiles, EpisodeRecord, Store};
 pub use table::{CampaignResult, Comparison, EndCounts, PolicyRow, StageCount};
 pub use trocar_workflow::{Error, Result};

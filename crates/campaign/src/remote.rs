@@ -204,7 +204,10 @@ impl RemotePolicy {
 
 /// Connects once to every server among `policies`, so that one that does not answer is reported
 /// before anything is built.
-pub(super) fn check_servers(policies: &[&PolicySpec], progress: &dyn Progress) -> Result<()> {
+///
+/// # Errors
+/// A server that cannot be reached or does not speak the protocol; an interruption.
+pub fn check_servers(policies: &[&PolicySpec], progress: &dyn Progress) -> Result<()> {
     let stop = Arc::new(AtomicBool::new(false));
     let mut endpoints = Vec::new();
     for spec in policies.iter().filter(|p| p.is_server()) {

@@ -339,3 +339,10 @@ impl Store {
         fs::rename(&partial, &path).map_err(io(&path))
     }
 }
+
+/// Writes a file whole or not at all, beside the campaigns of a folder that exists.
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    let partial = path.with_extension("part");
+    fs::write(&partial, bytes).map_err(io(&partial))?;
+    fs::rename(&partial, path).map_err(io(path))
+}

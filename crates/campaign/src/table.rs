@@ -271,7 +271,7 @@ fn row(name: &str, records: &[&EpisodeRecord], names: &[&str], manifest: &Manife
     }
 }
 
-fn compare(a: &[&EpisodeRecord], b: &[&EpisodeRecord]) -> Option<Comparison> {
+pub(crate) fn compare(a: &[&EpisodeRecord], b: &[&EpisodeRecord]) -> Option<Comparison> {
     let pairs: Vec<(&EpisodeRecord, &EpisodeRecord)> =
         a.iter().filter_map(|x| b.iter().find(|y| y.seed == x.seed).map(|y| (*x, *y))).collect();
     let (first, second) = pairs.first()?;

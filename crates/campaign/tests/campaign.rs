@@ -10,7 +10,7 @@ use tempfile::TempDir;
 use trocar_campaign::{Campaign, EpisodeFiles, Job, Manifest, PolicySpec, Store, run_episode};
 use trocar_core::{Silent, StopAfter};
 use trocar_remote::{Array, Call, Dialect, Loopback, LoopbackOptions, Map, Value};
-use trocar_scene::{Distribution, Factor, Scene, Specimens, Split, TaskName, VariationSet};
+use trocar_scene::{BackendName, Distribution, Factor, Scene, Specimens, Split, TaskName, VariationSet};
 use trocar_task::EpisodeFile;
 use trocar_testing::tube;
 use trocar_workflow::EpisodeRun;
@@ -27,6 +27,7 @@ fn campaign(folder: &Path, policies: &[&str], episodes: usize) -> Campaign {
         split: Split::Seen,
         seed: 0,
         variation: Some(VariationSet::None),
+        backend: None,
         by: Vec::new(),
         jobs: 1,
         retry_failed: false,
@@ -509,4 +510,31 @@ fn episodes_that_repeat_others_are_counted_and_told() {
     let kept = std::fs::read(folder.join("episodes/scripted/000000/result.json")).unwrap();
     let kept: serde_json::Value = serde_json::from_slice(&kept).unwrap();
     assert!(["lift_mm", "slip_mm", "gap_mm", "snap_mm"].iter().all(|key| kept[*key].is_null()), "{kept}");
+}
+
+/// A campaign on two backends is a campaign on each, in its own folder, and their comparison.
+#[test]
+fn backends_are_compared_on_the_same_seeds() {
+    let dir = TempDir::new().unwrap();
+    scene(dir.path());
+    let (campaign, output) = (campaign(dir.path(), &["scripted", "random"], 2), dir.path().join("both"));
+    let both = campaign.run_on(&BackendName::ALL, &output, &Silent).unwrap();
+    let names: Vec<&str> = both.backends.iter().map(|of| of.backend.name()).collect();
+    assert_eq!(names, ["tetrahedra", "lattice"]);
+    let [agreement] = &both.agreements[..] else { panic!("{:?}", both.agreements) };
+    assert_eq!(agreement.policies.iter().map(|p| p.seeds).collect::<Vec<_>>(), [2, 2]);
+    // The physics differs, and so do the final states.
+    assert_ne!(both.backends[0].result.hash, both.backends[1].result.hash);
+    let alone = Campaign { backend: Some(BackendName::Lattice), ..campaign.clone() };
+    assert_eq!(alone.run(&dir.path().join("alone"), &Silent).unwrap().hash, both.backends[1].result.hash);
+    for file in ["backends.json", "report.html", "tetrahedra/report.html", "lattice/report.html"] {
+        assert!(output.join(file).is_file(), "{file}");
+    }
+    for backends in [&[BackendName::Lattice][..], &[BackendName::Lattice, BackendName::Lattice]] {
+        let said = campaign.run_on(backends, &output, &Silent).unwrap_err().to_string();
+        assert!(said.contains("--backend"), "{said}");
+    }
+    // Another backend is another campaign.
+    let said = alone.run(&output.join("tetrahedra"), &Silent).unwrap_err().to_string();
+    assert!(said.contains("campaign"), "{said}");
 }

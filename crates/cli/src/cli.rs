@@ -23,7 +23,7 @@ pub use view::*;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use trocar_scene::{Split, VariationSet};
+use trocar_scene::{BackendName, Split, VariationSet};
 
 /// Trocar makes deformable organs from recordings of a surgical field, and scores robot policies on
 /// them.
@@ -95,6 +95,12 @@ pub enum Command {
 fn variation_set(name: &str) -> Result<VariationSet, String> {
     let known = VariationSet::ALL.map(VariationSet::name).join(", ");
     VariationSet::named(name).ok_or_else(|| format!("the sets are {known}"))
+}
+
+/// The backend of that name, for the command line.
+fn backend(name: &str) -> Result<BackendName, String> {
+    let known = BackendName::ALL.map(BackendName::name).join(", ");
+    BackendName::named(name).ok_or_else(|| format!("the backends are {known}"))
 }
 
 /// The split of that name, for the command line.

@@ -134,8 +134,13 @@ impl Body {
     /// Least ratio of deformed to rest volume at the integration points, at these positions (m);
     /// below 0 where tissue is inverted.
     pub fn least_volume_ratio(&self, positions: &[DVec3]) -> f64 {
+        self.volume_ratios(positions).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The least ratio of each hexahedron.
+    pub fn volume_ratios(&self, positions: &[DVec3]) -> impl Iterator<Item = f64> {
         let ratio = |hex| self.element(hex).least_volume_ratio(&self.corners(hex, positions));
-        (0..self.lattice.hexahedra().len()).map(ratio).fold(f64::INFINITY, f64::min)
+        (0..self.lattice.hexahedra().len()).map(ratio)
     }
 
     pub(crate) fn element(&self, hex: usize) -> Element<'_> {

@@ -15,20 +15,22 @@ pub struct RestStiffness {
 }
 
 impl Body {
-    /// Elastic and viscous energy (J) with the nodes at `x` (m); adds its gradient (N).
+    /// Elastic and viscous energy (J) with the nodes at `x` (m), and the least ratio of volumes;
+    /// adds the energy's gradient (N).
     ///
     /// All work is done on the calling thread.
-    pub fn add_elastic(&self, x: &[DVec3], flow: &Flow, gradient: &mut [DVec3]) -> f64 {
-        let mut energy = 0.0;
+    pub fn add_elastic(&self, x: &[DVec3], flow: &Flow, gradient: &mut [DVec3]) -> (f64, f64) {
+        let (mut energy, mut least) = (0.0, f64::INFINITY);
         for (i, hex) in self.lattice().hexahedra().iter().enumerate() {
             let before = flow.before.get(i).map(|before| (flow, before));
-            let (part, forces) = self.element(i).forces(&self.corners(i, x), before);
+            let (part, forces, ratio) = self.element(i).forces(&self.corners(i, x), before);
             energy += part;
+            least = least.min(ratio);
             for (node, force) in hex.nodes.iter().zip(&forces) {
                 gradient[*node as usize] += *force;
             }
         }
-        energy
+        (energy, least)
     }
 
     /// A matrix with a block for each pair of nodes that a hexahedron joins.

@@ -101,20 +101,22 @@ impl Element<'_> {
         }
     }
 
-    /// Energy (J) and its gradient by each node's position (N), the viscous part included if the
-    /// strains before are given. The same as [`Self::evaluate`], without singular values.
-    pub fn forces(&self, x: &[DVec3; 8], before: Option<(&Flow, &[DMat3; 8])>) -> (f64, [DVec3; 8]) {
-        let (mut energy, mut gradient, mut point) = (0.0, [DVec3::ZERO; 8], 0);
+    /// Energy (J), its gradient by each node's position (N), the viscous part included if the
+    /// strains before are given, and the least ratio of volumes. The same as [`Self::evaluate`],
+    /// without singular values.
+    pub fn forces(&self, x: &[DVec3; 8], before: Option<(&Flow, &[DMat3; 8])>) -> (f64, [DVec3; 8], f64) {
+        let (mut energy, mut gradient, mut point, mut least) = (0.0, [DVec3::ZERO; 8], 0, f64::INFINITY);
         self.for_points(|u, volume, part| {
             let gradients = self.gradients(u);
             let f = deformation(x, &gradients);
             let (mut density, mut stress) = self.material.stress(part, f);
-            if let (Some((flow, before)), Part::Deviatoric) = (before, part) {
-                // The points of the fill come later; they have no viscosity.
-                if let Some(before) = before.get(point) {
-                    let viscous = flow.stress(f, before);
+            // The points of the fill come later. They have no viscosity, and may turn inside out.
+            if part == Part::Deviatoric && point < 8 {
+                if let Some((flow, before)) = before {
+                    let viscous = flow.stress(f, &before[point]);
                     (density, stress) = (density + viscous.0, stress + viscous.1);
                 }
+                least = least.min(f.determinant());
                 point += 1;
             }
             energy += volume * density;
@@ -122,7 +124,7 @@ impl Element<'_> {
                 *to += volume * (stress * *g);
             }
         });
-        (energy, gradient)
+        (energy, gradient, least)
     }
 
     /// C = F'F at the points of the tissue's deviatoric part.
@@ -154,12 +156,11 @@ impl Element<'_> {
         }
     }
 
-    /// Least ratio of volumes J over the integration points.
+    /// Least ratio of volumes J over the integration points of the tissue.
     pub fn least_volume_ratio(&self, x: &[DVec3; 8]) -> f64 {
-        let mut least = f64::INFINITY;
-        let ratio = |u: DVec3| deformation(x, &self.gradients(u)).determinant();
-        self.for_points(|u, _, _| least = least.min(ratio(u)));
-        least
+        let ratio =
+            |corner: DVec3| deformation(x, &self.gradients(self.hex.centre + self.hex.spread * corner)).determinant();
+        CORNERS.into_iter().map(ratio).fold(f64::INFINITY, f64::min)
     }
 }
 

@@ -302,6 +302,17 @@ pub struct Tissue {
     pub support: Support,
 }
 
+impl Tissue {
+    /// The same tissue on another backend, without the settings that only the other one has.
+    #[must_use]
+    pub fn on(self, backend: BackendName) -> Self {
+        match backend {
+            BackendName::Tetrahedra => Self { backend, cell_mm: None, law: None, ..self },
+            BackendName::Lattice => Self { backend, schedule: ScheduleName::Fast, ..self },
+        }
+    }
+}
+
 impl Default for Tissue {
     /// The paper's figures (section IV-C).
     fn default() -> Self {
@@ -335,6 +346,24 @@ pub enum BackendName {
     Lattice,
 }
 
+impl BackendName {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Tetrahedra, Self::Lattice];
+
+    /// Its name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tetrahedra => "tetrahedra",
+            Self::Lattice => "lattice",
+        }
+    }
+
+    /// The backend of that name; `tets` for short.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|backend| backend.name() == name).or((name == "tets").then_some(Self::Tetrahedra))
+    }
+}
+
 /// A scene on tetrahedra is written as before there were others.
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
 fn is_tetrahedra(backend: &BackendName) -> bool {
@@ -345,7 +374,7 @@ fn is_tetrahedra(backend: &BackendName) -> bool {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LatticeLaw {
-    /// Rotated linear elasticity. It turns inside out where jaws squeeze it.
+    /// Rotated linear elasticity.
     Corotated,
     /// Stable neo-Hookean.
     #[default]

@@ -38,6 +38,11 @@ pub(crate) trait Solver: Send + Sync + Sized {
         None
     }
 
+    /// The same, to be found and ended by an [`IslandFrame`].
+    fn contacts_mut(&mut self) -> Option<&mut ContactSet> {
+        None
+    }
+
     /// Forces of rigidly held vertices on each tool at the end of the last frame, for a solver that
     /// knows them. Others have them from the stress of the tetrahedra.
     fn held_forces(&self) -> Option<&[ToolForce]> {
@@ -57,6 +62,41 @@ pub(crate) struct IslandFrame<'a, S: Solver> {
     pub frame: &'a Frame<'a>,
     /// Length of a substep (s).
     pub h: f32,
+}
+
+impl<S: Solver> IslandFrame<'_, S> {
+    /// Finds the contacts of a substep that goes from one share of the frame to another: those
+    /// between bodies, and each body's own.
+    pub fn begin_contacts(&mut self, from: f64, to: f64) {
+        let Self { slots, pairs, frame, h, .. } = self;
+        pairs.find(&**slots, frame, *h, |_| false);
+        for BodySlot { index, body, solver, state, .. } in slots.iter_mut() {
+            if let Some(contacts) = solver.contacts_mut() {
+                contacts.find(&frame.of(*index), body, [from, to], |i| state.x[i], |i| *h * state.v[i]);
+            }
+        }
+    }
+
+    /// Ends a substep of the contacts, when a share of the frame is over.
+    pub fn end_contacts(&mut self, share: f64) {
+        let Self { slots, pairs, frame, .. } = self;
+        for BodySlot { index, body, solver, state, .. } in slots.iter_mut() {
+            if let Some(contacts) = solver.contacts_mut() {
+                contacts.end_substep(&frame.of(*index), body, share, |i| state.x[i]);
+            }
+        }
+        pairs.end_substep(&**slots);
+    }
+
+    /// Ends the frame of the contacts: the states keep the anchors.
+    pub fn keep_contacts(&mut self) {
+        for BodySlot { solver, state, .. } in self.slots.iter_mut() {
+            if let Some(contacts) = solver.contacts_mut() {
+                contacts.end_frame(state);
+            }
+        }
+        self.pairs.end_frame(self.slots);
+    }
 }
 
 /// A body with its solver.

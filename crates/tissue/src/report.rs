@@ -145,11 +145,18 @@ impl StepReport {
             return;
         }
         self.max_speed = f64::from(state.v.iter().map(|v| v.length_squared()).fold(0.0, f32::max)).sqrt();
-        for (tet, rest) in body.tets.iter().zip(&body.volumes) {
-            let [a, b, c, d] = tet.map(|i| state.x[i as usize]);
-            let volume = f64::from((b - a).cross(c - a).dot(d - a)) / 6.0;
-            self.inverted += usize::from(volume <= 0.0);
-            self.min_volume_ratio = self.min_volume_ratio.min(volume / rest);
+        let mut count = |ratio: f64| {
+            self.inverted += usize::from(ratio <= 0.0);
+            self.min_volume_ratio = self.min_volume_ratio.min(ratio);
+        };
+        if let (Some(embedding), Some(lattice)) = (&body.lattice, &state.lattice) {
+            // Tetrahedra in a lattice bear nothing; its cells do.
+            embedding.body.volume_ratios(&lattice.positions).for_each(count);
+        } else {
+            for (tet, rest) in body.tets.iter().zip(&body.volumes) {
+                let [a, b, c, d] = tet.map(|i| state.x[i as usize]);
+                count(f64::from((b - a).cross(c - a).dot(d - a)) / 6.0 / rest);
+            }
         }
         let stretched = (0..state.x.len()).any(|i| {
             let too_long = |length: f32, j: u32| {

@@ -9,7 +9,7 @@ use trocar_geometry::TetMesh;
 use trocar_testing::blocks::{FRAME, GRAVITY, block, nodes, tissue};
 use trocar_tissue::{
     Backend, BodyContact, BodyDescription, Collider, Compliance, Cut, Grasp, LatticeSettings, Law, Material, Model,
-    ModelBuilder, Shape, SolverSettings, State, Stepper, SupportPlane, ToolMotion, sever,
+    ModelBuilder, Shape, SolverSettings, State, Stepper, SupportPlane, ToolContact, ToolMotion, sever,
 };
 
 /// Every backend, with its name.
@@ -397,5 +397,46 @@ fn bad_input_is_refused() {
         let mut broken = state.clone();
         broken.set_position(&model, 0, 0, DVec3::NAN);
         assert!(stepper.step(&model, &mut broken, &tools(0)).divergence.is_some(), "{name}");
+    }
+}
+
+/// Jaws that close on a block until they almost meet squeeze it flat between them. Nothing inverts,
+/// and when they open it comes back.
+#[test]
+fn a_clamp_inverts_nothing() {
+    let mesh = block([5, 4, 3], 4e-3);
+    let pinned = nodes(&mesh, |p| p.x < 1e-9);
+    for (name, backend) in backends() {
+        let mut builder = ModelBuilder::new().backend(backend).tool_contact(ToolContact::Surface);
+        let (material, pinned, supports) = (viscous(6e3), pinned.clone(), vec![]);
+        builder.body(BodyDescription { name: "block".into(), mesh: &mesh, material, pinned, supports }).unwrap();
+        for tool in 0..2 {
+            let shape = Shape::Capsule { ends: [-20e-3 * DVec3::Y, 20e-3 * DVec3::Y], radius: 1.5e-3 };
+            let name = format!("jaw {tool}");
+            builder.collider(Collider { name, tool, shape, rest_offset: 1.5e-3, friction: 0.6 }).unwrap();
+        }
+        let model = builder.build().unwrap();
+        let (mut state, mut stepper) = (State::new(&model), stepper(&model, 1));
+        let middle = DVec3::new(10e-3, 8e-3, 6e-3);
+        let jaws = |gap: f64| [1.0, -1.0].map(|side| at(middle + (0.5 * gap + 3e-3) * side * DVec3::Z));
+        // From 2 mm beside the block to a gap of 3 mm in a second, and back in half a second.
+        let gap = |frame: i32| match frame {
+            0..=60 => 16e-3 - 13e-3 * f64::from(frame) / 60.0,
+            61..=90 => 3e-3,
+            _ => 3e-3 + 13e-3 * (f64::from(frame - 90) / 30.0).min(1.0),
+        };
+        let mut smallest = f64::INFINITY;
+        for frame in 0..180 {
+            let motions = jaws(gap(frame)).into_iter().zip(jaws(gap(frame + 1)));
+            let motions: Vec<ToolMotion> = motions.map(|(from, to)| ToolMotion { from, to }).collect();
+            let report = stepper.step(&model, &mut state, &motions);
+            assert_eq!((report.inverted, report.divergence), (0, None), "{name}, frame {frame}: {report:?}");
+            smallest = smallest.min(report.min_volume_ratio);
+        }
+        let off = (0..mesh.vertices.len()).map(|i| state.position(&model, 0, i).distance(mesh.vertices[i]));
+        let off = off.fold(0.0, f64::max);
+        println!("{name}: smallest volume {smallest:.3} of that at rest; off by {:.4} mm at the end", 1e3 * off);
+        assert!(smallest < 0.4, "{name} was hardly squeezed: {smallest}");
+        assert!(off < 2e-4, "{name} does not come back: {off} m");
     }
 }

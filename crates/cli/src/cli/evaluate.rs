@@ -2,7 +2,7 @@
 
 use clap::Args;
 use std::path::PathBuf;
-use trocar_scene::{Split, VariationSet};
+use trocar_scene::{BackendName, Split, VariationSet};
 
 #[derive(Debug, Args)]
 pub struct Evaluate {
@@ -30,6 +30,10 @@ pub struct Evaluate {
     /// run makes the anatomies of the set, about a minute each.
     #[arg(long, value_name = "SET", value_parser = super::variation_set)]
     pub variation: Option<VariationSet>,
+    /// What bears the tissue: tetrahedra (tets) or lattice; the scene's by default. Given twice, the
+    /// campaign runs on both, in a folder each, and a page tells whether they judge policies alike.
+    #[arg(long = "backend", value_name = "BACKEND", value_parser = super::backend)]
+    pub backends: Vec<BackendName>,
     /// Show success by these in the terminal, separated by commas: factors (modulus_kpa), groups
     /// (organ, tissue, place, start, setup, tool, camera, light, modulus), drawn numbers
     /// (left.tilt_deg), split, or all. Page and JSON have them too, or all that varies by default.

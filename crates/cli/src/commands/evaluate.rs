@@ -17,6 +17,7 @@ pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Re
         split: arguments.split,
         seed: arguments.seed,
         variation: arguments.variation,
+        backend: arguments.backends.first().copied(),
         by: arguments.by.clone(),
         jobs: arguments.jobs,
         retry_failed: arguments.retry_failed,
@@ -24,6 +25,13 @@ pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Re
         phantoms: arguments.phantoms.clone(),
     };
     note_reach(&arguments.scene);
+    if arguments.backends.len() > 1 {
+        let result = campaign.run_on(&arguments.backends, &arguments.output, progress)?;
+        output::print(json, &result, |r| {
+            format!("{}\n{}\n{}report {}", r.policies().text(), r.differences().text(), r.agreement().text(), r.report)
+        });
+        return Ok(());
+    }
     let result = campaign.run(&arguments.output, progress)?;
     if let Some(why) = repeats(result.distinct_outcomes, result.episodes) {
         eprintln!("warning: {why}");

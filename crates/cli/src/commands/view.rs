@@ -5,6 +5,7 @@ use serde::Serialize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+use trocar_campaign::{PolicySpec, check_servers};
 use trocar_core::Progress;
 use trocar_view::{Building, Options, Server, Source, build_page};
 use trocar_workflow::{Error, Result};
@@ -33,6 +34,9 @@ pub fn run(arguments: &cli::View, json: bool, progress: &dyn Progress) -> Result
     }
     let source = Source::of(&arguments.source);
     source.check().map_err(wrong)?;
+    if let Ok(policy) = PolicySpec::parse(&arguments.policy) {
+        check_servers(&[&policy], progress)?;
+    }
     let left = Arc::<AtomicBool>::default();
     if arguments.until_eof {
         let left = Arc::clone(&left);

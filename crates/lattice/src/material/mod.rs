@@ -1,6 +1,6 @@
 //! Materials: isotropic laws, split into a deviatoric and a volumetric part.
 //!
-//! Both parts are free of stress at rest, and the deviatoric one limits large stretches. Their sum
+//! Both parts are free of stress at rest, and the deviatoric one limits strain. Their sum
 //! at the same F is the whole law. The linear deviatoric part is mu |dev e|^2, which no change of
 //! volume enters; the linear volumetric part is K/2 tr(e)^2. So the first is integrated at eight
 //! points and the second at one, without hourglass modes and without locking (Malkus and Hughes,
@@ -11,10 +11,11 @@
 //! for isotropic distortion energies", 2019).
 
 mod corotated;
+mod limits;
 mod stable_neo_hookean;
-mod stretch;
 
 use glam::{DMat3, DVec3};
+use limits::Limits;
 use trocar_geometry::symmetric::{cofactor, eigen, nearest_rotation};
 
 /// Constitutive law.
@@ -61,6 +62,12 @@ impl Material {
         self.young_modulus / (3.0 * (1.0 - 2.0 * self.poisson_ratio))
     }
 
+    /// What limits its strain.
+    fn limits(&self) -> Limits {
+        let mu = self.shear_modulus();
+        Limits { mu, strength: self.bulk_modulus() + mu / 3.0 }
+    }
+
     /// What is out of range, and the range.
     pub(crate) fn check(&self) -> Result<(), String> {
         let ranges = [
@@ -82,9 +89,9 @@ impl Material {
         if part == Part::Volumetric {
             return (energy, stress);
         }
-        match stretch::limit(self.shear_modulus(), f) {
+        match self.limits().stress(f) {
             None => (energy, stress),
-            Some((limit, pull)) => (energy + limit, stress + pull),
+            Some((limit, push)) => (energy + limit, stress + push),
         }
     }
 
@@ -125,7 +132,7 @@ impl Material {
             (Law::StableNeoHookean, Part::Volumetric) => stable_neo_hookean::volumetric(self.bulk_modulus(), s),
         };
         if part == Part::Deviatoric {
-            stretch::add(self.shear_modulus(), s, &mut at);
+            self.limits().add(s, &mut at);
         }
         at
     }

@@ -137,6 +137,7 @@ impl Study for RolloutsExperiment {
             split: Split::Seen,
             seed: self.seed,
             variation: Some(VariationSet::None),
+            backend: None,
             by: Vec::new(),
             jobs: self.jobs,
             retry_failed: false,

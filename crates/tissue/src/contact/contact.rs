@@ -122,16 +122,17 @@ impl Contact {
         Some(Push { gradient: force * self.normal + across * off, along, across })
     }
 
-    /// The same contact as one of a `vertex` of the site alone, which bears a `share` of it, while
-    /// the others stay where they are; each vertex at `x`.
-    pub fn of_vertex(&self, vertex: u32, share: f32, x: impl Fn(u32) -> Vec3A) -> Self {
-        let (here, at) = (x(vertex), self.site.at(&x));
+    /// The same contact as one of a single `vertex` at `here`, while all others stay where they
+    /// are. The point of contact is at `at`, and moves by `share` of the vertex's motion: negative
+    /// for a corner of the triangle that another body touches.
+    pub fn of_vertex(&self, vertex: u32, share: f32, here: Vec3A, at: Vec3A) -> Self {
         Self {
             site: Site::vertex(vertex),
+            normal: share.signum() * self.normal,
             point: here - (self.height(at) / share) * self.normal,
             place: here - (at - self.place) / share,
             stiffness: self.stiffness * share * share,
-            hard_from: self.hard_from / share,
+            hard_from: self.hard_from / share.abs(),
             ..*self
         }
     }

@@ -366,7 +366,7 @@ impl ContactSet {
         for contact in &self.contacts[self.of_vertices..] {
             for (vertex, share) in contact.site.shares().filter(|(_, share)| *share > MIN_SHARE) {
                 if !self.fixed[vertex as usize] {
-                    self.pressed.push(contact.of_vertex(vertex, share, &x));
+                    self.pressed.push(contact.of_vertex(vertex, share, x(vertex), contact.site.at(&x)));
                 }
             }
         }

@@ -303,18 +303,9 @@ impl Pairs {
         let first = self.roles.partition_point(|role| (role.member as usize) < member);
         for role in self.roles[first..].iter().take_while(|role| role.member as usize == member) {
             let pair = &self.list[role.pair as usize];
-            let (offset, here) = (pair.offset(x), x(member, role.vertex));
-            let (height, off) = (pair.contact.height(offset), offset - pair.contact.place);
             // Share of the vertex's motion by which the offset changes.
             let share = if role.corner == 3 { 1.0 } else { -pair.weights[role.corner as usize] };
-            self.pressed.push(Contact {
-                site: Site::vertex(role.vertex),
-                normal: share.signum() * pair.contact.normal,
-                point: here - (height / share) * pair.contact.normal,
-                place: here - off / share,
-                stiffness: pair.contact.stiffness * share * share,
-                ..pair.contact
-            });
+            self.pressed.push(pair.contact.of_vertex(role.vertex, share, x(member, role.vertex), pair.offset(x)));
         }
         &self.pressed
     }

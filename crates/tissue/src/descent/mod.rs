@@ -52,28 +52,21 @@ impl Solver for TouchingDescent {
     }
 
     fn substep(island: &mut IslandFrame<'_, Self>, from: f64, to: f64) {
-        let IslandFrame { slots, pairs, frame, h, .. } = island;
-        pairs.find(&**slots, frame, *h, |_| false);
-        for BodySlot { index, body, solver, state, .. } in slots.iter_mut() {
-            let way = |i: usize| *h * state.v[i];
-            solver.contacts.find(&frame.of(*index), body, [from, to], |i| state.x[i], way);
-        }
-        sweep_substep(slots, pairs, frame, to);
-        for BodySlot { index, body, solver, state, .. } in slots.iter_mut() {
-            solver.contacts.end_substep(&frame.of(*index), body, to, |i| state.x[i]);
-        }
-        pairs.end_substep(&**slots);
+        island.begin_contacts(from, to);
+        sweep_substep(island.slots, island.pairs, island.frame, to);
+        island.end_contacts(to);
     }
 
     fn end_frame(island: &mut IslandFrame<'_, Self>) {
-        for BodySlot { solver, state, .. } in island.slots.iter_mut() {
-            solver.contacts.end_frame(state);
-        }
-        island.pairs.end_frame(island.slots);
+        island.keep_contacts();
     }
 
     fn contacts(&self) -> Option<&ContactSet> {
         Some(&self.contacts)
+    }
+
+    fn contacts_mut(&mut self) -> Option<&mut ContactSet> {
+        Some(&mut self.contacts)
     }
 }
 

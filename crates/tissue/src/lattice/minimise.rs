@@ -30,6 +30,9 @@ const MAX_STEPS: usize = 100;
 /// this share more or less.
 const TOLERANCE: f64 = 2e-5;
 
+/// Volume over rest volume that a cell keeps: no step goes below it, unless it was lower before.
+const MIN_VOLUME_RATIO: f64 = 0.01;
+
 /// Acceleration that makes a mass a weight on earth (m/s2).
 const EARTH: f64 = 9.81;
 
@@ -81,9 +84,9 @@ pub(super) struct Precision {
 impl Island<'_> {
     /// Moves the lattices to the minimum of the potential.
     pub fn minimise(&mut self) -> Outcome {
+        let first = self.first_elastic();
         self.update_limits();
         let start = self.x.clone();
-        let first = self.lattices.iter().map(|lattice| lattice.first_elastic(&self.x[lattice.member])).collect();
         let mut value = self.with_terms(&self.x, first);
         let mut pairs: Vec<Pair> = Vec::new();
         let (mut outcome, mut of_factor, mut projected) = (Outcome::default(), 0, false);
@@ -136,6 +139,26 @@ impl Island<'_> {
                 return outcome;
             }
         }
+    }
+
+    /// The elastic parts where the search starts. A body whose guess turns a cell inside out starts
+    /// where it was.
+    fn first_elastic(&mut self) -> Vec<Elastic> {
+        let Self { lattices, x, .. } = self;
+        let first = lattices.iter().map(|lattice| {
+            let x = &mut x[lattice.member];
+            let elastic = lattice.first_elastic(x);
+            if elastic.least_ratio >= MIN_VOLUME_RATIO {
+                return elastic;
+            }
+            let before = lattice.elastic(&lattice.start);
+            if before.least_ratio <= elastic.least_ratio {
+                return elastic;
+            }
+            x.clone_from(&lattice.start);
+            before
+        });
+        first.collect()
     }
 
     /// Sets the limits of friction to those of the present positions. Returns whether any changed.
@@ -216,7 +239,12 @@ impl Island<'_> {
             // Near the minimum energies differ by less than their rounding; gradients still tell.
             let same = (next.energy - value.energy).abs() <= ROUNDING * value.energy.abs();
             let nearer = || dot(&next.gradient, &next.gradient) < dot(&value.gradient, &value.gradient);
-            if lower || (same && nearer()) {
+            let whole = value
+                .elastic
+                .iter()
+                .zip(&next.elastic)
+                .all(|(before, now)| now.least_ratio >= MIN_VOLUME_RATIO.min(before.least_ratio));
+            if whole && (lower || (same && nearer())) {
                 return Some((x, next, share));
             }
             share *= 0.5;

@@ -112,14 +112,10 @@ impl Solver for LatticeSolver {
     }
 
     fn substep(island: &mut IslandFrame<'_, Self>, from: f64, to: f64) {
-        let IslandFrame { slots, pairs, frame, h, .. } = island;
-        pairs.find(&**slots, frame, *h, |_| false);
+        island.begin_contacts(from, to);
+        let IslandFrame { slots, pairs, frame, .. } = island;
         for member in 0..slots.len() {
             slots[member].solver.pressed = pairs.presses(&**slots, member);
-        }
-        for BodySlot { index, body, solver, state, .. } in slots.iter_mut() {
-            let way = |i: usize| *h * state.v[i];
-            solver.contacts.find(&frame.of(*index), body, [from, to], |i| state.x[i], way);
         }
         let h = frame.dt * (to - from);
         let mut terms = Vec::new();
@@ -154,21 +150,19 @@ impl Solver for LatticeSolver {
         }
         let x: Vec<&[DVec3]> = x.iter().map(|x| &x[..]).collect();
         press_tools(slots, &terms[first_held..], &x, frame);
-        for BodySlot { index, body, solver, state, .. } in slots.iter_mut() {
-            solver.contacts.end_substep(&frame.of(*index), body, to, |i| state.x[i]);
-        }
-        pairs.end_substep(&**slots);
+        island.end_contacts(to);
     }
 
     fn end_frame(island: &mut IslandFrame<'_, Self>) {
-        for BodySlot { solver, state, .. } in island.slots.iter_mut() {
-            solver.contacts.end_frame(state);
-        }
-        island.pairs.end_frame(island.slots);
+        island.keep_contacts();
     }
 
     fn contacts(&self) -> Option<&ContactSet> {
         Some(&self.contacts)
+    }
+
+    fn contacts_mut(&mut self) -> Option<&mut ContactSet> {
+        Some(&mut self.contacts)
     }
 
     fn held_forces(&self) -> Option<&[ToolForce]> {

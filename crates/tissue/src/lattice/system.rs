@@ -42,11 +42,13 @@ pub(super) struct LatticeSystem {
     known: Option<Known>,
 }
 
-/// Elastic energy (J) and its gradient (N), with inertia, viscosity, pins and loads.
+/// Elastic energy (J) and its gradient (N), with inertia, viscosity, pins and loads, and the least
+/// volume of a cell over its rest volume.
 #[derive(Clone, Debug)]
 pub(super) struct Elastic {
     pub energy: f64,
     pub gradient: Vec<DVec3>,
+    pub least_ratio: f64,
 }
 
 /// An elastic part and all that it depends on.
@@ -121,14 +123,14 @@ impl Lattice<'_> {
     /// The elastic part at `x`.
     pub fn elastic(&self, x: &[DVec3]) -> Elastic {
         let mut gradient = vec![DVec3::ZERO; x.len()];
-        let energy = self.evaluate(x, &mut gradient);
-        Elastic { energy, gradient }
+        let (energy, least_ratio) = self.evaluate(x, &mut gradient);
+        Elastic { energy, gradient, least_ratio }
     }
 
-    /// Energy at `x` (J); adds its gradient (N).
-    fn evaluate(&self, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
+    /// Energy at `x` (J), and the least ratio of volumes; adds the energy's gradient (N).
+    fn evaluate(&self, x: &[DVec3], gradient: &mut [DVec3]) -> (f64, f64) {
         let lattice = &self.embedding.body;
-        let mut energy = lattice.add_elastic(x, &self.system.flow, gradient);
+        let (mut energy, least) = lattice.add_elastic(x, &self.system.flow, gradient);
         for pin in lattice.pins() {
             let away = pin.point.interpolate(x) - pin.target;
             energy += 0.5 * pin.stiffness * away.length_squared();
@@ -140,7 +142,7 @@ impl Lattice<'_> {
             energy += 0.5 * force.dot(away) - self.loads[i].dot(away);
             gradient[i] += force - self.loads[i];
         }
-        energy
+        (energy, least)
     }
 
     /// Turns a vector over the nodes into the solution of the matrix.
