@@ -4,10 +4,11 @@ use crate::bench::{
     CellBench, EpisodeBench, GraspBench, MeshingBench, OrgansBench, RenderBench, ScalingBench, ViewBench,
 };
 use crate::experiment::{
-    ContactExperiment, ControllerGridExperiment, ConvergenceExperiment, CutForceExperiment, ElementQualityExperiment,
-    GraspDesignsExperiment, IntegratorsExperiment, MeshConvergenceExperiment, PortBudgetExperiment,
-    PortRegraspExperiment, RandomActionsExperiment, ReconstructionExperiment, RobustnessExperiment, RolloutsExperiment,
-    SettlingExperiment, SimilarityExperiment, WrenchExperiment,
+    BeamExperiment, ContactExperiment, ControllerGridExperiment, ConvergenceExperiment, CutForceExperiment,
+    ElementQualityExperiment, GraspDesignsExperiment, IntegratorsExperiment, MeshConvergenceExperiment,
+    PortBudgetExperiment, PortRegraspExperiment, RandomActionsExperiment, ReconstructionExperiment,
+    RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment, TruthCubeExperiment,
+    WrenchExperiment,
 };
 use crate::study::{Entry, Of};
 
@@ -17,6 +18,8 @@ pub static STUDIES: &[&dyn Entry] = &[
     &Of::<ConvergenceExperiment>::NEW,
     &Of::<MeshConvergenceExperiment>::NEW,
     &Of::<IntegratorsExperiment>::NEW,
+    &Of::<TruthCubeExperiment>::NEW,
+    &Of::<BeamExperiment>::NEW,
     &Of::<ContactExperiment>::NEW,
     &Of::<SettlingExperiment>::NEW,
     &Of::<GraspDesignsExperiment>::NEW,

@@ -82,6 +82,7 @@ pub struct ModelBuilder {
     bodies: Vec<Body>,
     gravity: DVec3,
     mass_floor: MassFloor,
+    point_masses: Vec<(u32, f64)>,
     contact_stiffness: f64,
     filtered: Vec<[usize; 2]>,
     colliders: Vec<Collider>,
@@ -103,6 +104,7 @@ impl ModelBuilder {
             bodies: Vec::new(),
             gravity: DVec3::ZERO,
             mass_floor: MassFloor::default(),
+            point_masses: Vec::new(),
             contact_stiffness: CONTACT_STIFFNESS,
             filtered: Vec::new(),
             colliders: Vec::new(),
@@ -122,6 +124,13 @@ impl ModelBuilder {
     /// otherwise.
     pub fn mass_floor(mut self, floor: MassFloor) -> Self {
         self.mass_floor = floor;
+        self
+    }
+
+    /// Hangs masses (kg) on nodes of the bodies that are added after this; none otherwise. They fall
+    /// and swing with the node. Tetrahedra only.
+    pub fn point_masses(mut self, masses: &[(u32, f64)]) -> Self {
+        self.point_masses = masses.to_vec();
         self
     }
 
@@ -147,7 +156,8 @@ impl ModelBuilder {
     /// volumes, elements that are flat beside their edges, isolated nodes, numbers that are not
     /// finite, extents outside 1 mm to 2 m, moduli outside 1 Pa to 1 GPa, Poisson ratios outside 0
     /// to 0.4999, densities outside 1 to 30,000 kg/m3, negative viscosities, pins out of range or
-    /// named twice, invalid supports, and mass floors outside 0 to 1.
+    /// named twice, invalid supports, mass floors outside 0 to 1, and point masses of nodes that
+    /// there are not, outside 0 to 100 kg, or on a lattice.
     pub fn body(&mut self, body: BodyDescription<'_>) -> Result<usize> {
         check::check(&body).map_err(|reason| Error::Body { body: body.name.clone(), reason })?;
         if let MassFloor::MedianShare(share) = self.mass_floor
@@ -161,7 +171,18 @@ impl ModelBuilder {
                 self.contact_stiffness
             )));
         }
-        let mut body = lay_out(body, self.mass_floor, self.contact_stiffness, None);
+        let nodes = body.mesh.vertices.len();
+        let wrong = |(node, kg): &&(u32, f64)| *node as usize >= nodes || !(0.0..=100.0).contains(kg);
+        if let Some((node, kg)) = self.point_masses.iter().find(wrong) {
+            let reason = format!("a mass of {kg} kg on node {node}; must be in [0, 100] kg, on one of {nodes} nodes");
+            return Err(Error::Body { body: body.name.clone(), reason });
+        }
+        if !self.point_masses.is_empty() && self.backend != Backend::Tetrahedra {
+            let reason = "masses on nodes are for tetrahedra".to_owned();
+            return Err(Error::Body { body: body.name.clone(), reason });
+        }
+        let masses = NodeMasses::Lumped { floor: self.mass_floor, added: &self.point_masses };
+        let mut body = lay_out(body, self.contact_stiffness, masses);
         if let Backend::Lattice(settings) = self.backend {
             body.lattice = embed(&body, settings)?;
         }
@@ -240,6 +261,14 @@ impl ModelBuilder {
     }
 }
 
+/// Where the masses of a body's nodes come from.
+pub(crate) enum NodeMasses<'a> {
+    /// From the volume around each node, raised to a floor; and masses (kg) that are added.
+    Lumped { floor: MassFloor, added: &'a [(u32, f64)] },
+    /// From the body that it is a piece of.
+    Inherited(Inherited),
+}
+
 /// Quantities that a piece of a body inherits from the whole, in order to keep every bit of its
 /// positions and masses.
 pub(crate) struct Inherited {
@@ -251,14 +280,8 @@ pub(crate) struct Inherited {
     pub raised: usize,
 }
 
-/// Lays out a checked body for the sweeps. A piece of another body takes the `inherited` values,
-/// and no mass floor.
-pub(crate) fn lay_out(
-    description: BodyDescription<'_>,
-    mass_floor: MassFloor,
-    contact_stiffness: f64,
-    inherited: Option<Inherited>,
-) -> Body {
+/// Lays out a checked body for the sweeps.
+pub(crate) fn lay_out(description: BodyDescription<'_>, contact_stiffness: f64, masses: NodeMasses<'_>) -> Body {
     let BodyDescription { name, mesh, material, pinned: pinned_nodes, supports } = description;
     let nodes = mesh.vertices.len();
     let mut pinned = vec![false; nodes];
@@ -304,10 +327,11 @@ pub(crate) fn lay_out(
     for c in 0..color_count {
         color_start[c + 1] += color_start[c];
     }
-    let (masses, raised_masses, origin) = match inherited {
-        Some(whole) => (whole.masses, whole.raised, whole.origin),
-        None => {
-            let (masses, raised) = lumped_masses(&share, material.density, mass_floor);
+    let (masses, raised_masses, origin) = match masses {
+        NodeMasses::Inherited(whole) => (whole.masses, whole.raised, whole.origin),
+        NodeMasses::Lumped { floor, added } => {
+            let (mut masses, raised) = lumped_masses(&share, material.density, floor);
+            added.iter().for_each(|(node, kg)| masses[*node as usize] += kg);
             (masses, raised, mesh.vertices.iter().sum::<DVec3>() / nodes as f64)
         }
     };

@@ -1,6 +1,8 @@
 //! The paper's tables and figures: one file or folder each.
 
 mod appendix;
+mod beam;
+mod block;
 mod contact;
 mod controller_grid;
 mod convergence;
@@ -17,8 +19,10 @@ mod robustness;
 mod rollouts;
 mod settling;
 mod similarity;
+mod truth_cube;
 mod wrench;
 
+pub use beam::BeamExperiment;
 pub use contact::ContactExperiment;
 pub use controller_grid::ControllerGridExperiment;
 pub use convergence::ConvergenceExperiment;
@@ -35,4 +39,5 @@ pub use robustness::RobustnessExperiment;
 pub use rollouts::RolloutsExperiment;
 pub use settling::SettlingExperiment;
 pub use similarity::SimilarityExperiment;
+pub use truth_cube::TruthCubeExperiment;
 pub use wrench::WrenchExperiment;

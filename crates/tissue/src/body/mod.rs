@@ -111,7 +111,8 @@ impl Body {
                 && self.pinned == other.pinned
                 && self.supports == other.supports
                 && self.contact_stiffness == other.contact_stiffness
-                && self.lattice_settings() == other.lattice_settings())
+                && self.lattice_settings() == other.lattice_settings()
+                && self.vertices.iter().map(|v| v.mass).eq(other.vertices.iter().map(|v| v.mass)))
     }
 
     /// How its lattice was made; None without one.

@@ -3,9 +3,9 @@
 
 use super::split::{Split, parts};
 use super::{Piece, Severed};
-use crate::builder::{Inherited, embed, lay_out};
+use crate::builder::{Inherited, NodeMasses, embed, lay_out};
 use crate::state::{Anchor, BodyState, WarmStart};
-use crate::{Backend, Body, BodyDescription, Compliance, Grasp, Hole, MassFloor, Model, Result, State};
+use crate::{Backend, Body, BodyDescription, Compliance, Grasp, Hole, Model, Result, State};
 use trocar_geometry::TetMesh;
 
 /// A mass this many times the weight of the volume around a node was raised to the floor; less is
@@ -48,7 +48,7 @@ pub(super) fn carry(model: &Model, state: &State, index: usize, split: &Split) -
         let pinned = (0..nodes.len() as u32).filter(|k| whole.pinned[nodes[*k as usize] as usize]).collect();
         let (material, supports) = (whole.material, whole.supports.clone());
         let description = BodyDescription { name, mesh: &mesh, material, pinned, supports };
-        let mut body = lay_out(description, MassFloor::None, whole.contact_stiffness, Some(inherited));
+        let mut body = lay_out(description, whole.contact_stiffness, NodeMasses::Inherited(inherited));
         if let Backend::Lattice(settings) = model.backend {
             body.lattice = embed(&body, settings)?;
         }

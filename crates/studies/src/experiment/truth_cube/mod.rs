@@ -1,0 +1,135 @@
+//! A measured body: beads in a cube of silicone under compression, beside where our tissue puts
+//! them.
+
+mod cube;
+mod data;
+mod page;
+mod result;
+
+pub use result::TruthCubeResult;
+
+use crate::Result;
+use crate::study::{Job, Kind as StudyKind, Study};
+use crate::trials::Outcomes;
+use clap::Args;
+use cube::{Cube, Kind, Law, distances};
+use data::Beads;
+use result::{ByStrain, CubeRow, figures};
+use std::path::PathBuf;
+use trocar_report::document::Document;
+use trocar_tissue::ConstitutiveModel;
+use trocar_tissue_reference::statics::Elements;
+use xxhash_rust::xxh3::xxh3_64;
+
+/// Where the data are unless told otherwise, beside the project.
+const DATA: &str = "../shared/data/truth_cube/uniaxial_positions.csv";
+
+/// Cells across the cube, of tetrahedra at three sizes.
+const CELLS: [usize; 3] = [4, 6, 8];
+
+/// The model of the study's headline: what the cell steps unless told otherwise, with Poisson's
+/// ratio as the authors of the data give it.
+const CHOSEN: Trial =
+    Trial { kind: Kind::Linear, cells: 8, law: Law::Finite(ConstitutiveModel::StableNeoHookean), poisson_ratio: 0.499 };
+
+/// Poisson's ratios.
+const RATIOS: [f64; 3] = [0.45, 0.49, 0.499];
+
+/// Where beads in a cube of silicone go when it is compressed, by each material, kind and size of
+/// elements, beside where a scanner saw them (Kerdok and others 2003).
+#[derive(Clone, Debug, Args)]
+pub struct TruthCubeExperiment {
+    /// The table of the beads (CSV): at rest, and under compressions that its second last line of
+    /// head names.
+    #[arg(long, value_name = "FILE", default_value = DATA)]
+    pub data: PathBuf,
+    /// Models in parallel; all threads by default. The figures do not depend on it.
+    #[arg(long, default_value_t = 0)]
+    pub threads: usize,
+}
+
+/// One model of the cube.
+struct Trial {
+    kind: Kind,
+    cells: usize,
+    law: Law,
+    poisson_ratio: f64,
+}
+
+impl Study for TruthCubeExperiment {
+    const NAME: &'static str = "truth-cube";
+    const KIND: StudyKind = StudyKind::Experiment;
+    const FOLDER: Option<&'static str> =
+        Some("Output folder of trials and report. Finished trials in it are used again.");
+    type Figures = TruthCubeResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(TruthCubeResult, Document)> {
+        let beads = Beads::read(&self.data)?;
+        job.claim()?;
+        let cube = Cube::new(&beads);
+        let trials = trials();
+        let places: Vec<_> = beads.strains.iter().map(|strain| (&strain.percent, &strain.at)).collect();
+        let settings = format!("{:016x}", xxh3_64(format!("{:?} {places:?}", beads.rest).as_bytes()));
+        let Outcomes { rows, .. } = job.trials(
+            "models",
+            &settings,
+            &trials,
+            Trial::key,
+            self.threads,
+            |trial, _| Ok(trial.run(&cube, &beads)),
+        )?;
+        let elements = CHOSEN.elements(&cube);
+        let predicted = beads.strains.iter().map(|strain| cube.predict(&elements, CHOSEN.law, strain));
+        let result = TruthCubeResult::of(&beads, rows, CHOSEN.run(&cube, &beads), predicted.collect::<Result<_>>()?);
+        let document = page::document(&beads, &result)?;
+        Ok((result, document))
+    }
+}
+
+/// All models: every law, ratio and size with linear tetrahedra, and what mends their locking.
+fn trials() -> Vec<Trial> {
+    let laws = ConstitutiveModel::ALL.map(Law::Finite).into_iter().chain([Law::Linear]);
+    let mut all = Vec::new();
+    for law in laws {
+        for poisson_ratio in RATIOS {
+            for cells in CELLS {
+                for kind in [Kind::Linear, Kind::Corrected, Kind::Patches] {
+                    all.push(Trial { kind, cells, law, poisson_ratio });
+                }
+            }
+            all.push(Trial { kind: Kind::Quadratic, cells: CELLS[1], law, poisson_ratio });
+        }
+    }
+    all
+}
+
+impl Trial {
+    fn key(&self) -> String {
+        format!("{:?}, {}, {:?}, {}", self.kind, self.cells, self.law, self.poisson_ratio)
+    }
+
+    fn elements(&self, cube: &Cube<'_>) -> Elements {
+        cube.elements(self.kind, self.cells, self.law, self.poisson_ratio)
+    }
+
+    fn run(&self, cube: &Cube<'_>, beads: &Beads) -> CubeRow {
+        let elements = self.elements(cube);
+        let (mut median_mm, mut rms_mm) = (ByStrain::new(), ByStrain::new());
+        for strain in &beads.strains {
+            // A law may have no equilibrium there: St. Venant-Kirchhoff tissue gives way when pressed.
+            let Ok(predicted) = cube.predict(&elements, self.law, strain) else { continue };
+            let [median, rms] = figures(distances(&predicted, strain));
+            median_mm.insert(strain.percent.clone(), median);
+            rms_mm.insert(strain.percent.clone(), rms);
+        }
+        CubeRow {
+            elements: self.kind.name().to_owned(),
+            cell_mm: 80.0 / self.cells as f64,
+            nodes: elements.rest().len(),
+            law: self.law.name().to_owned(),
+            poisson_ratio: self.poisson_ratio,
+            median_mm,
+            rms_mm,
+        }
+    }
+}
