@@ -4,15 +4,17 @@ use super::machine::Machine;
 use super::timing::Timing;
 use crate::names::{SolverName, kilopascals};
 use crate::scenes::{BenchScene, FRAME, OracleRun, Organs, Run, material, mean_error, rest_positions, rms_error};
+use crate::statistics::median;
 use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
+use std::time::Instant;
 use trocar_core::Progress;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::table::{count, fixed, percent};
-use trocar_tissue::Material;
+use trocar_tissue::{Isa, Material};
 use trocar_workflow::{check_interrupted, solver_named};
 
 /// Frames of the tube scene at which the error is measured.
@@ -53,6 +55,32 @@ pub struct OrgansBench {
     /// Simulated time of settling before the sag is measured (s).
     #[arg(long, default_value_t = 3.0)]
     pub settle: f64,
+    /// Also time the dragged appendix and the shaken organs by these instruction sets, frame beside
+    /// frame, separated by commas: avx512, avx2, portable.
+    #[arg(long = "isa", value_name = "SETS", value_delimiter = ',', value_parser = isa)]
+    pub isas: Vec<Isa>,
+}
+
+/// The instruction set of that name.
+fn isa(name: &str) -> std::result::Result<Isa, String> {
+    let sets = [("avx512", Isa::Avx512), ("avx2", Isa::Avx2), ("portable", Isa::Portable)];
+    let known = sets.into_iter().find(|(known, _)| *known == name);
+    known.map(|(_, isa)| isa).ok_or_else(|| "the sets are avx512, avx2, portable".to_owned())
+}
+
+/// The timed scenes by one instruction set.
+#[derive(Clone, Debug, Serialize)]
+pub struct IsaRow {
+    /// The instruction set.
+    pub isa: &'static str,
+    /// 1/60 s over the median wall time of a frame with the appendix dragged.
+    pub real_time_factor: f64,
+    /// The same with every organ shaken.
+    pub real_time_factor_moving: f64,
+    /// `real_time_factor` over that of the first row.
+    pub over_first: f64,
+    /// `real_time_factor_moving` over that of the first row.
+    pub moving_over_first: f64,
 }
 
 /// Figures of the benchmark.
@@ -85,6 +113,8 @@ pub struct OrgansResult {
     pub damped: bool,
     /// Source of the organs.
     pub mesh: String,
+    /// The timed scenes by each set of `--isa`, frame beside frame.
+    pub rows: Vec<IsaRow>,
     /// Number of organs.
     pub organs: usize,
     /// Name of the organ used as the appendix.
@@ -149,6 +179,9 @@ impl Study for OrgansBench {
         let moving = time(&BenchScene::moving(&organs, material)?)?;
         let sagging = time(&BenchScene::sag(&organs, material)?)?;
 
+        let rows =
+            self.by_isa(&BenchScene::drag(&organs, material)?, &BenchScene::moving(&organs, material)?, progress)?;
+
         let sag = BenchScene::sag(&organs, damped)?;
         let mut run = Run::new(&sag, schedule, self.threads)?;
         let frames = (self.settle / FRAME).round().max(1.0) as usize;
@@ -181,6 +214,7 @@ impl Study for OrgansBench {
             damped: self.damped,
             substeps: schedule.substeps(),
             mesh: organs.source.clone(),
+            rows,
             organs: organs.organs.len(),
             appendix: organs.organs[organs.appendix].name.clone(),
             nodes: organs.nodes(),
@@ -198,6 +232,53 @@ impl Study for OrgansBench {
         };
         let document = document(&result);
         Ok((result, document))
+    }
+}
+
+impl OrgansBench {
+    /// Times both scenes by each set of `--isa`.
+    fn by_isa(&self, drag: &BenchScene, moving: &BenchScene, progress: &dyn Progress) -> Result<Vec<IsaRow>> {
+        if self.isas.is_empty() {
+            return Ok(Vec::new());
+        }
+        let (drag, moving) = (self.side_by_side(drag, progress)?, self.side_by_side(moving, progress)?);
+        let row = |(k, isa): (usize, &Isa)| IsaRow {
+            isa: isa.name(),
+            real_time_factor: FRAME / drag[k],
+            real_time_factor_moving: FRAME / moving[k],
+            over_first: drag[0] / drag[k],
+            moving_over_first: moving[0] / moving[k],
+        };
+        Ok(self.isas.iter().enumerate().map(row).collect())
+    }
+
+    /// Median wall time of a frame of a scene (s) by each set, which take turns frame by frame.
+    fn side_by_side(&self, scene: &BenchScene, progress: &dyn Progress) -> Result<Vec<f64>> {
+        let schedule = solver_named(self.schedule.name())?;
+        let mut runs = Vec::new();
+        for isa in &self.isas {
+            if !isa.is_available() {
+                return Err(Error::Mismatch(format!("--isa: this machine has no {}", isa.name())));
+            }
+            Isa::limit(*isa);
+            runs.push((Run::new(scene, schedule, self.threads)?, Vec::with_capacity(self.frames)));
+        }
+        Isa::limit(Isa::ALL[0]);
+        let warm_up = self.frames / 4;
+        progress.begin(scene.name, (warm_up + self.frames) as u64);
+        for frame in 0..warm_up + self.frames {
+            check_interrupted(progress)?;
+            for (run, times) in &mut runs {
+                let began = Instant::now();
+                run.frame()?;
+                if frame >= warm_up {
+                    times.push(began.elapsed().as_secs_f64());
+                }
+            }
+            progress.advance(1);
+        }
+        progress.end();
+        Ok(runs.iter_mut().map(|(_, times)| median(times)).collect())
     }
 }
 
@@ -287,6 +368,19 @@ fn document(r: &OrgansResult) -> Document {
             r.tube_yielded_substeps
         ),
     ];
-    Document::new("Organs", "Speed and error of stepping")
-        .with(Section::new("Six organs", "").table(table).lines(lines))
+    let mut section = Section::new("Six organs", "").table(table).lines(lines);
+    if !r.rows.is_empty() {
+        let times = |x: f64| format!("{}\u{d7}", fixed(x, 2));
+        section = section.table(Table::of(
+            &r.rows,
+            &[
+                ("instructions", &|row| row.isa.to_owned()),
+                ("dragged, real time", &|row| times(row.real_time_factor)),
+                ("over the first", &|row| fixed(row.over_first, 2)),
+                ("shaken, real time", &|row| times(row.real_time_factor_moving)),
+                ("over the first", &|row| fixed(row.moving_over_first, 2)),
+            ],
+        ));
+    }
+    Document::new("Organs", "Speed and error of stepping").with(section)
 }

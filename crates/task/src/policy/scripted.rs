@@ -46,6 +46,11 @@ const CUT_DEPTH: f64 = 0.0140;
 /// half of a cutter's, and as much between them as either jaw's aim may be off.
 const BESIDE: f64 = 0.0060;
 
+/// Open blades go no deeper where tissue presses them apart with this share of the jaws' force: they
+/// could not close. From the smaller share on the force is watched every period.
+const MAX_SPREAD: f64 = 0.8;
+const WATCHED_SPREAD: f64 = 0.2;
+
 /// Lift of the jaws (m) above the gate's.
 const ABOVE_GATE: f64 = 0.0025;
 
@@ -395,9 +400,31 @@ impl Scripted {
         self.start_phase(next);
     }
 
-    /// Whether the phase is over before its time.
+    /// Whether the phase is over before its time: the jaws hold tissue, or open blades are as deep
+    /// in it as the jaws can close on.
     fn early(&self, episode: &Episode) -> bool {
-        self.feels() && seen(episode).task.grasped > 0.0 && self.done > 0
+        let holds = self.feels() && seen(episode).task.grasped > 0.0;
+        self.done > 0 && (holds || self.spread(episode) >= MAX_SPREAD)
+    }
+
+    /// While open blades go into tissue: the force with which it presses them apart, over that of
+    /// the jaws; else 0.
+    fn spread(&self, episode: &Episode) -> f64 {
+        if self.style != Style::Careful || self.phase != Phase::Enter {
+            return 0.0;
+        }
+        let Some(k) = episode.roles().0 else { return 0.0 };
+        let jaws = episode.scene().tools().get(k).map_or(f64::INFINITY, |tool| tool.instrument.jaw_force_n);
+        episode.cell().observe()[k].jaw_force / jaws
+    }
+
+    /// Makes the place where the grasper is that of the grasp.
+    fn stay(&mut self, episode: &Episode) {
+        let Some(k) = episode.roles().0 else { return };
+        let tip = episode.cell().observe()[k].tip;
+        if let (Some(aim), Some(last)) = (&mut self.grasp, self.last.get(k)) {
+            (aim.pose.translation, aim.setpoint) = (tip.translation, *last);
+        }
     }
 
     /// Whether the jaws are closing and respond to the tissue's force.
@@ -487,6 +514,9 @@ impl Policy for Scripted {
     fn act(&mut self, episode: &Episode) -> Result<Vec<Action>> {
         let mut chunk = Vec::with_capacity(CHUNK);
         if self.early(episode) {
+            if self.phase == Phase::Enter {
+                self.stay(episode);
+            }
             self.next(episode);
         }
         while chunk.len() < CHUNK {
@@ -504,7 +534,7 @@ impl Policy for Scripted {
                 break;
             }
             chunk.push(self.action(episode)?);
-            if self.feels() {
+            if self.feels() || self.spread(episode) > WATCHED_SPREAD {
                 break;
             }
         }
