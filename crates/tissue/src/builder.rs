@@ -175,11 +175,11 @@ impl ModelBuilder {
         let wrong = |(node, kg): &&(u32, f64)| *node as usize >= nodes || !(0.0..=100.0).contains(kg);
         if let Some((node, kg)) = self.point_masses.iter().find(wrong) {
             let reason = format!("a mass of {kg} kg on node {node}; must be in [0, 100] kg, on one of {nodes} nodes");
-            return Err(Error::Body { body: body.name.clone(), reason });
+            return Err(Error::Body { body: body.name, reason });
         }
         if !self.point_masses.is_empty() && self.backend != Backend::Tetrahedra {
             let reason = "masses on nodes are for tetrahedra".to_owned();
-            return Err(Error::Body { body: body.name.clone(), reason });
+            return Err(Error::Body { body: body.name, reason });
         }
         let masses = NodeMasses::Lumped { floor: self.mass_floor, added: &self.point_masses };
         let mut body = lay_out(body, self.contact_stiffness, masses);

@@ -75,11 +75,11 @@ impl Elements {
             squeezed = simd.max_f32x16(squeezed, lack(simd, ratio, load(simd, &self.ratios[b])));
             let mut p = self.stress.at(simd, &f, ratio);
             let square = dot(f[0], f[0]) + dot(f[1], f[1]) + dot(f[2], f[2]);
-            if simd.any_true_mask32x16(simd.simd_gt_f32x16(square, splat(simd, MAX_FREE_STRETCH_SQUARED as f32))) {
-                if let Some(limit) = &self.limit {
-                    self.stretched = true;
-                    add_limit(simd, limit, &f, &mut p);
-                }
+            if simd.any_true_mask32x16(simd.simd_gt_f32x16(square, splat(simd, MAX_FREE_STRETCH_SQUARED as f32)))
+                && let Some(limit) = &self.limit
+            {
+                self.stretched = true;
+                add_limit(simd, limit, &f, &mut p);
             }
             let volume = load(simd, &batch.volumes);
             for c in 0..3 {
