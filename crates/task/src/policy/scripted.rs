@@ -410,12 +410,17 @@ impl Scripted {
     /// While open blades go into tissue: the force with which it presses them apart, over that of
     /// the jaws; else 0.
     fn spread(&self, episode: &Episode) -> f64 {
-        if self.style != Style::Careful || self.phase != Phase::Enter {
+        if self.style != Style::Careful || !self.goes_in() {
             return 0.0;
         }
         let Some(k) = episode.roles().0 else { return 0.0 };
         let jaws = episode.scene().tools().get(k).map_or(f64::INFINITY, |tool| tool.instrument.jaw_force_n);
         episode.cell().observe()[k].jaw_force / jaws
+    }
+
+    /// Whether open blades are on their way to the grasp.
+    fn goes_in(&self) -> bool {
+        matches!(self.phase, Phase::Approach | Phase::Enter)
     }
 
     /// Makes the place where the grasper is that of the grasp.
@@ -514,8 +519,9 @@ impl Policy for Scripted {
     fn act(&mut self, episode: &Episode) -> Result<Vec<Action>> {
         let mut chunk = Vec::with_capacity(CHUNK);
         if self.early(episode) {
-            if self.phase == Phase::Enter {
+            if self.goes_in() {
                 self.stay(episode);
+                self.phase = Phase::Enter;
             }
             self.next(episode);
         }
