@@ -87,6 +87,7 @@ def test_wrong_actions_are_refused_by_name_and_change_nothing(one):
         ({"image_size": (64.5, 64)}, "image_size: .*integers in"),
         ({"image_size": "64"}, "image_size"),
         ({"variation": "some"}, "variation: 'some' .*none, easy, standard, hard"),
+        ({"backend": "springs"}, "backend: 'springs' .*tetrahedra, lattice"),
         ({"split": "test"}, "split: 'test' .*seen, unseen, both"),
     ]:
         with pytest.raises(ValueError, match=words):

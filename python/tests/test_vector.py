@@ -44,6 +44,29 @@ def test_many_cells_give_the_numbers_of_one(one):
     assert list(envs.call("task")) == ["grasp-lift"] * 3 and len(envs.envs) == 3
 
 
+def test_many_cells_on_the_lattice_give_the_numbers_of_one(one):
+    brief = BRIEF | {"backend": "lattice"}
+    envs = gym.make_vec("trocar/GraspLift-v0", num_envs=2, privileged=True, **brief)
+    alone = trocar.TrocarEnv(**brief, threads=1)
+    actions = [actions_of(one, seed, 2) for seed in (20, 21)]
+    envs.reset(seed=20)
+    hashes = []
+    for k, seed in enumerate((20, 21)):
+        alone.reset(seed=seed)
+        for action in actions[k]:
+            alone.step(action)
+        hashes.append(alone.state_hash)
+    for step in range(2):
+        envs.step(np.stack([a[step] for a in actions]))
+    assert [cell.state_hash for cell in envs.envs] == hashes
+    # The tissue is another one than the tetrahedra.
+    alone = trocar.TrocarEnv(**BRIEF, threads=1)
+    alone.reset(seed=20)
+    for action in actions[0]:
+        alone.step(action)
+    assert alone.state_hash != hashes[0]
+
+
 def test_the_other_autoreset_modes(one):
     options = {"num_envs": 2, "task": "grasp-lift", "episode_s": 0.1}
     actions = np.stack([actions_of(one, 3, 1)[0]] * 2)

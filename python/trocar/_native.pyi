@@ -52,6 +52,7 @@ class Cells:
         sensor_noise: bool = False,
         variation: str | None = None,
         split: str = "seen",
+        backend: str | None = None,
     ) -> None: ...
     @property
     def count(self) -> int: ...
@@ -144,6 +145,7 @@ class Campaign:
         split: str = "seen",
         variation: str | None = None,
         by: list[str] = ...,
+        backend: str | None = None,
     ) -> None: ...
     @property
     def plan(self) -> str: ...

@@ -47,6 +47,7 @@ def run(
     split: str = "seen",
     variation: str | None = None,
     by: Sequence[str] = (),
+    backend: str | None = None,
     workers: int | None = None,
     ray_address: str | None = None,
     retry_failed: bool = False,
@@ -56,6 +57,7 @@ def run(
     """Runs the missing episodes of the campaign in `output` and returns its `result.json`.
 
     - `split`, `variation`, `by`: as `--split`, `--variation` and `--by` of `trocar evaluate`.
+    - `backend`: what bears the tissue, `tetrahedra` or `lattice` (default: the scene's).
     - `ray_address`: `auto` for a running cluster, `local` for a new one on this machine,
       `host:port`; None runs without Ray.
     - `workers`: episodes at once (default: one a CPU).
@@ -88,6 +90,7 @@ def run(
         split=split,
         variation=variation,
         by=list(by),
+        backend=backend,
     )
     progress = progress or (lambda done, missing: None)
     try:
@@ -151,6 +154,11 @@ def main(arguments: list[str] | None = None) -> int:
         metavar="NAMES",
         help="show success by these, as in trocar evaluate (default: all that varies)",
     )
+    parser.add_argument(
+        "--backend",
+        choices=["tetrahedra", "lattice"],
+        help="what bears the tissue (default: the scene's)",
+    )
     parser.add_argument("--workers", type=int, help="episodes at once (default: one a CPU)")
     parser.add_argument(
         "--retry-failed", action="store_true", help="run episodes again whose policy failed"
@@ -198,6 +206,7 @@ def main(arguments: list[str] | None = None) -> int:
             split=options.split,
             variation=options.variation,
             by=options.by,
+            backend=options.backend,
             workers=options.workers,
             ray_address=options.ray,
             retry_failed=options.retry_failed,

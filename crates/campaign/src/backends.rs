@@ -35,12 +35,18 @@ pub struct BackendsResult {
 }
 
 impl Campaign {
-    /// Runs the campaign on each of `backends`, in the folder of `output` that has its name, and
-    /// writes `backends.json` and a page beside them.
+    /// Runs the campaign on each of `backends`, at most `max_episodes` episodes on each, in the
+    /// folder of `output` that has its name. Writes `backends.json` and a page beside them.
     ///
     /// # Errors
     /// As [`run`](Self::run); fewer than two backends, or one twice.
-    pub fn run_on(&self, backends: &[BackendName], output: &Path, progress: &dyn Progress) -> Result<BackendsResult> {
+    pub fn run_on(
+        &self,
+        backends: &[BackendName],
+        max_episodes: Option<usize>,
+        output: &Path,
+        progress: &dyn Progress,
+    ) -> Result<BackendsResult> {
         let twice = (1..backends.len()).any(|k| backends[..k].contains(&backends[k]));
         if backends.len() < 2 || twice {
             return Err(Error::Mismatch("--backend: several backends must be given, each once".to_owned()));
@@ -48,7 +54,7 @@ impl Campaign {
         let (mut results, mut records) = (Vec::new(), Vec::new());
         for backend in backends {
             let campaign = Self { backend: Some(*backend), ..self.clone() };
-            let (store, manifest, by) = campaign.run_episodes(&output.join(backend.name()), None, progress)?;
+            let (store, manifest, by) = campaign.run_episodes(&output.join(backend.name()), max_episodes, progress)?;
             results.push(OfBackend { backend: *backend, result: store.write_results(&manifest, &by)? });
             records.push((*backend, store.records(&manifest)?));
         }

@@ -45,6 +45,7 @@ pub const DEFAULT_VARIATION: VariationSet = VariationSet::Standard;
 ///     seed: 0,
 ///     variation: None,
 ///     backend: None,
+///     cell_mm: None,
 ///     by: Vec::new(),
 ///     jobs: 1,
 ///     retry_failed: false,
@@ -74,6 +75,8 @@ pub struct Campaign {
     pub variation: Option<VariationSet>,
     /// What bears the tissue, instead of the scene's backend.
     pub backend: Option<BackendName>,
+    /// Edge of the lattice's cells (mm), instead of the scene's; for the lattice only.
+    pub cell_mm: Option<f64>,
     /// By what success is shown: factors, groups, drawn numbers; everything that varies if empty.
     pub by: Vec<String>,
     /// Number of parallel episodes; 0 for one per core. Results do not depend on it.
@@ -114,6 +117,10 @@ impl Campaign {
         let mut scene = read_varied(&self.scene, self.variation, DEFAULT_VARIATION)?;
         if let Some(backend) = self.backend {
             scene.tissue = scene.tissue.on(backend);
+        }
+        if self.cell_mm.is_some() {
+            scene.tissue.cell_mm = self.cell_mm;
+            scene.validate()?;
         }
         refuse_overlap(Path::new(&self.scene), output)?;
         // Making a specimen takes minutes, so everything that does not need it is checked first.

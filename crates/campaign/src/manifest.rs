@@ -3,7 +3,7 @@
 use crate::policy_spec::PolicySpec;
 use crate::remote;
 use serde::{Deserialize, Serialize};
-use trocar_scene::{Scene, SpecimenSource, Split, Variation};
+use trocar_scene::{BackendName, Scene, SpecimenSource, Split, Variation};
 use trocar_specimen::Specimen;
 use trocar_task::{scene_hash, specimen_hash};
 use trocar_workflow::{Error, Result, counted};
@@ -116,6 +116,9 @@ pub struct Manifest {
     /// The variation between episodes.
     #[serde(default)]
     pub variation: Variation,
+    /// What bears the tissue.
+    #[serde(default)]
+    pub backend: BackendName,
     /// Control period of the scene (s).
     #[serde(default)]
     pub control_period_s: f64,
@@ -152,6 +155,7 @@ impl Manifest {
             split,
             seed,
             variation: scene.variation.clone(),
+            backend: scene.tissue.backend,
             control_period_s: 1.0 / f64::from(scene.rates.control_hz),
             max_episodes: None,
         })
@@ -208,6 +212,7 @@ mod tests {
             split: Split::Seen,
             seed: 7,
             variation: Variation::default(),
+            backend: BackendName::default(),
             control_period_s: 1.0 / 30.0,
             max_episodes: None,
         };

@@ -28,6 +28,7 @@ fn campaign(folder: &Path, policies: &[&str], episodes: usize) -> Campaign {
         seed: 0,
         variation: Some(VariationSet::None),
         backend: None,
+        cell_mm: None,
         by: Vec::new(),
         jobs: 1,
         retry_failed: false,
@@ -518,7 +519,7 @@ fn backends_are_compared_on_the_same_seeds() {
     let dir = TempDir::new().unwrap();
     scene(dir.path());
     let (campaign, output) = (campaign(dir.path(), &["scripted", "random"], 2), dir.path().join("both"));
-    let both = campaign.run_on(&BackendName::ALL, &output, &Silent).unwrap();
+    let both = campaign.run_on(&BackendName::ALL, None, &output, &Silent).unwrap();
     let names: Vec<&str> = both.backends.iter().map(|of| of.backend.name()).collect();
     assert_eq!(names, ["tetrahedra", "lattice"]);
     let [agreement] = &both.agreements[..] else { panic!("{:?}", both.agreements) };
@@ -531,7 +532,7 @@ fn backends_are_compared_on_the_same_seeds() {
         assert!(output.join(file).is_file(), "{file}");
     }
     for backends in [&[BackendName::Lattice][..], &[BackendName::Lattice, BackendName::Lattice]] {
-        let said = campaign.run_on(backends, &output, &Silent).unwrap_err().to_string();
+        let said = campaign.run_on(backends, None, &output, &Silent).unwrap_err().to_string();
         assert!(said.contains("--backend"), "{said}");
     }
     // Another backend is another campaign.

@@ -78,7 +78,7 @@ impl Default for Surroundings {
             filtered: Vec::new(),
             bed_friction: Some(SUPPORT_FRICTION),
             floating: Vec::new(),
-            mesh_correction: false,
+            mesh_correction: true,
             toughness: Vec::new(),
         }
     }

@@ -45,7 +45,7 @@ type FileList = Vec<(String, Vec<u8>)>;
 impl Campaign {
     /// Opens or creates the campaign in the folder `output`.
     #[new]
-    #[pyo3(signature = (scene, policies, episodes, seed, phantoms, output, *, split="seen", variation=None, by=Vec::new()))]
+    #[pyo3(signature = (scene, policies, episodes, seed, phantoms, output, *, split="seen", variation=None, by=Vec::new(), backend=None))]
     fn new(
         py: Python<'_>,
         scene: &str,
@@ -57,6 +57,7 @@ impl Campaign {
         split: &str,
         variation: Option<&str>,
         by: Vec<String>,
+        backend: Option<&str>,
     ) -> PyResult<Self> {
         py.detach(|| {
             let split = prepare::split(split)?;
@@ -68,7 +69,7 @@ impl Campaign {
                     return Err(wrong("output: the scene file is in this folder; write into another"));
                 }
             }
-            let scene = prepare::varied(scene, variation)?;
+            let scene = prepare::varied(scene, variation, backend)?;
             let by = By::parse(&by, &scene, split).map_err(|e| evaluate(&e))?;
             let (specimens, named) = prepare::named_specimens(&scene, split, &phantoms)?;
             let manifest = Manifest::new(&scene, &named, &specs, episodes, (split, seed)).map_err(|e| evaluate(&e))?;
@@ -175,7 +176,7 @@ impl Worker {
         let stop = stop.map(|s| Arc::clone(&s.0)).unwrap_or_default();
         let manifest: Manifest = serde_json::from_str(plan).map_err(|e| wrong(format!("plan: {e}")))?;
         py.detach(|| {
-            let scene = prepare::varied(scene, Some(manifest.variation.set.name()))?;
+            let scene = prepare::varied(scene, Some(manifest.variation.set.name()), Some(manifest.backend.name()))?;
             let (specimens, named) = prepare::named_specimens(&scene, manifest.split, &phantoms)?;
             let first = (manifest.split, manifest.seed);
             let own = Manifest::new(&scene, &named, &manifest.policies, manifest.episodes, first);

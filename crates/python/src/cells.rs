@@ -99,7 +99,7 @@ impl Cells {
     /// `count` episodes of `scene` on `threads` threads (0: as many as the machine has; results do
     /// not depend on them).
     #[new]
-    #[pyo3(signature = (scene, count, *, phantoms, threads=0, task=None, actions="pivots", episode_s=None, sensor_noise=false, variation=None, split="seen"))]
+    #[pyo3(signature = (scene, count, *, phantoms, threads=0, task=None, actions="pivots", episode_s=None, sensor_noise=false, variation=None, split="seen", backend=None))]
     fn new(
         py: Python<'_>,
         scene: &str,
@@ -112,6 +112,7 @@ impl Cells {
         sensor_noise: bool,
         variation: Option<&str>,
         split: &str,
+        backend: Option<&str>,
     ) -> PyResult<Self> {
         if count == 0 || count > 4096 {
             return Err(wrong(format!("num_envs: is {count}; 1 to 4096 cells")));
@@ -124,7 +125,7 @@ impl Cells {
                 return Err(wrong(format!("actions: '{other}' is unknown; {known} are known")));
             }
         };
-        let scene = prepare::scene(scene, variation, task, episode_s)?;
+        let scene = prepare::scene(scene, variation, backend, task, episode_s)?;
         let split = prepare::split(split)?;
         py.detach(|| {
             let specimens = prepare::specimens(&scene, split, &phantoms)?;

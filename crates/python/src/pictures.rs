@@ -60,7 +60,7 @@ pub fn cameras(scene: &str) -> PyResult<Vec<Described>> {
         let [width, height] = c.policy_size_px.map(|n| n as usize);
         (c.name.clone(), height, width, c.depth)
     };
-    Ok(prepare::scene(scene, None, None, None)?.cameras.iter().map(row).collect())
+    Ok(prepare::scene(scene, None, None, None, None)?.cameras.iter().map(row).collect())
 }
 
 impl Eyes {

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trocar_campaign::DEFAULT_VARIATION;
-use trocar_scene::{BUILTIN_TASKS, BUILTINS, Scene, Split, VariationSet};
+use trocar_scene::{BUILTIN_TASKS, BUILTINS, BackendName, Scene, Split, VariationSet};
 use trocar_specimen::Specimen;
 use trocar_workflow::{SpecimenCache, read_varied};
 
@@ -23,20 +23,36 @@ pub fn split(name: &str) -> PyResult<Split> {
     Split::named(name).ok_or_else(|| wrong(format!("split: '{name}' is unknown; it must be one of {known}")))
 }
 
-/// The scene `name` (or file) with the set `variation`. Without one, a scene that has no set varies
-/// as campaigns do.
-pub fn varied(name: &str, variation: Option<&str>) -> PyResult<Scene> {
+/// The scene `name` (or file) with the set `variation`, on the tissue backend `backend`. Without a
+/// set, a scene that has none varies as campaigns do. Without a backend it is the scene's.
+pub fn varied(name: &str, variation: Option<&str>, backend: Option<&str>) -> PyResult<Scene> {
     let set = variation.map(|set| {
         let known = VariationSet::ALL.map(VariationSet::name).join(", ");
         let unknown = || wrong(format!("variation: '{set}' is unknown; it must be one of {known}"));
         VariationSet::named(set).ok_or_else(unknown)
     });
-    read_varied(name, set.transpose()?, DEFAULT_VARIATION).map_err(|e| evaluate(&e))
+    let backend = backend.map(|backend| {
+        let known = BackendName::ALL.map(BackendName::name).join(", ");
+        let unknown = || wrong(format!("backend: '{backend}' is unknown; it must be one of {known}"));
+        BackendName::named(backend).ok_or_else(unknown)
+    });
+    let backend = backend.transpose()?;
+    let mut scene = read_varied(name, set.transpose()?, DEFAULT_VARIATION).map_err(|e| evaluate(&e))?;
+    if let Some(backend) = backend {
+        scene.tissue = scene.tissue.on(backend);
+    }
+    Ok(scene)
 }
 
 /// The same, asking for `task` where that is given and for `episode_s` seconds.
-pub fn scene(name: &str, variation: Option<&str>, task: Option<&str>, episode_s: Option<f64>) -> PyResult<Scene> {
-    let mut scene = varied(name, variation)?;
+pub fn scene(
+    name: &str,
+    variation: Option<&str>,
+    backend: Option<&str>,
+    task: Option<&str>,
+    episode_s: Option<f64>,
+) -> PyResult<Scene> {
+    let mut scene = varied(name, variation, backend)?;
     if let Some(task) = task {
         // A scene with stages of its own has one task.
         if scene.task.name.name() != task || scene.task.stages.is_empty() {
@@ -69,7 +85,7 @@ pub fn phantoms_folder() -> PathBuf {
 #[pyfunction]
 #[pyo3(signature = (scene, variation, split, phantoms))]
 pub fn missing_specimens(scene: &str, variation: Option<&str>, split: &str, phantoms: PathBuf) -> PyResult<usize> {
-    let (scene, split) = (varied(scene, variation)?, self::split(split)?);
+    let (scene, split) = (varied(scene, variation, None)?, self::split(split)?);
     let specimens = SpecimenCache::new(&scene, &phantoms);
     let all = scene.specimens();
     Ok(split.of_specimens(&all).iter().filter(|source| !specimens.is_made(source)).count())

@@ -1,7 +1,7 @@
-//! The organs of a scene: where they come from, what is said otherwise than in the specimen, and
-//! how their tissue is stepped.
+//! The organs of a scene: where they come from, and what is said otherwise than in the specimen.
 
 use crate::Phantom;
+use crate::tissue_preset::TissuePreset;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -150,6 +150,10 @@ pub struct OrganOverride {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MaterialOverride {
+    /// Measured values of a tissue, for what is left out here: appendix, liver, gallbladder,
+    /// bile-duct or small-bowel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub preset: Option<TissuePreset>,
     /// Constitutive model.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(schema_with = "material_models")]
@@ -177,12 +181,18 @@ fn material_models(_: &mut SchemaGenerator) -> Schema {
 impl MaterialOverride {
     /// The specimen's `material` with the scene's changes. Toughness is no part of it.
     pub fn applied_to(&self, material: Material) -> Material {
+        let preset = self.preset.map(TissuePreset::young_modulus_pa);
         Material {
             model: self.model.unwrap_or(material.model),
-            young_modulus_pa: self.young_modulus_pa.unwrap_or(material.young_modulus_pa),
+            young_modulus_pa: self.young_modulus_pa.or(preset).unwrap_or(material.young_modulus_pa),
             poisson_ratio: self.poisson_ratio.unwrap_or(material.poisson_ratio),
             density_kg_m3: self.density_kg_m3.unwrap_or(material.density_kg_m3),
         }
+    }
+
+    /// The toughness that the scene gives (J/m2).
+    pub fn toughness(&self) -> Option<f64> {
+        self.toughness_j_m2.or_else(|| self.preset?.toughness_j_m2())
     }
 }
 
@@ -241,169 +251,4 @@ impl PinRule {
             }
         }
     }
-}
-
-/// How tissue is stepped, by name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum ScheduleName {
-    /// The quasi-Newton method to a tolerance.
-    #[default]
-    Fast,
-    /// Vertex Block Descent, 8 substeps of 10 sweeps from the inertial predictor.
-    Paper,
-    /// The same with the adaptive start.
-    Adaptive,
-}
-
-/// What of tissue touches instruments.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum ToolContactKind {
-    /// The vertices of its surface: an instrument that is thinner than triangles are wide can pass
-    /// between them.
-    Vertices,
-    /// Its vertices, edges and triangles.
-    #[default]
-    Surface,
-}
-
-/// Solver and contact of the tissue.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Tissue {
-    /// What bears the tissue: tetrahedra, or a lattice of hexahedra around each organ.
-    #[serde(skip_serializing_if = "is_tetrahedra")]
-    pub backend: BackendName,
-    /// Edge of the lattice's cells (mm); 4 mm if left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub cell_mm: Option<f64>,
-    /// Law of a lattice's tissue: stable-neo-hookean (if left out) or corotated.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub law: Option<LatticeLaw>,
-    /// Schedule: fast (the default solver), paper or adaptive (Vertex Block Descent).
-    pub schedule: ScheduleName,
-    /// Whether tetrahedra are softer than their organ by what its mesh is too stiff, so that the
-    /// organ deflects as its material says.
-    pub mesh_correction: bool,
-    /// Distance at which contact between organs is looked for (mm).
-    pub contact_offset_mm: f64,
-    /// What of tissue touches instruments: vertices or surface.
-    pub tool_contact: ToolContactKind,
-    /// Distance at which tissue rests on the tips of instruments (mm).
-    pub tip_rest_offset_mm: f64,
-    /// Coulomb friction of tissue on tissue and of instruments on tissue.
-    pub friction: f64,
-    /// Pull at which tissue tears out of a compliant grasp (N).
-    pub tear_force_n: f64,
-    /// Pairs without contact: two organs, or an organ and `field`, the ground under the organs.
-    pub filtered_pairs: Vec<[String; 2]>,
-    /// The ground under the organs.
-    pub support: Support,
-}
-
-impl Tissue {
-    /// The same tissue on another backend, without the settings that only the other one has.
-    #[must_use]
-    pub fn on(self, backend: BackendName) -> Self {
-        match backend {
-            BackendName::Tetrahedra => Self { backend, cell_mm: None, law: None, ..self },
-            BackendName::Lattice => Self { backend, schedule: ScheduleName::Fast, ..self },
-        }
-    }
-}
-
-impl Default for Tissue {
-    /// The paper's figures (section IV-C).
-    fn default() -> Self {
-        Self {
-            backend: BackendName::Tetrahedra,
-            cell_mm: None,
-            law: None,
-            schedule: ScheduleName::Fast,
-            mesh_correction: false,
-            contact_offset_mm: 1.5,
-            tool_contact: ToolContactKind::Surface,
-            tip_rest_offset_mm: 1.5,
-            friction: 0.6,
-            // A wall of 1 mm (two layers of 0.5) over the 5 mm of the blades, at a strength of 1
-            // MPa.
-            tear_force_n: 5.0,
-            filtered_pairs: Vec::new(),
-            support: Support::default(),
-        }
-    }
-}
-
-/// What bears the tissue of a scene.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum BackendName {
-    /// The tetrahedra of the organs.
-    #[default]
-    Tetrahedra,
-    /// A regular lattice of hexahedra around each organ, in which its nodes are embedded.
-    Lattice,
-}
-
-impl BackendName {
-    /// All of them.
-    pub const ALL: [Self; 2] = [Self::Tetrahedra, Self::Lattice];
-
-    /// Its name in files and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Tetrahedra => "tetrahedra",
-            Self::Lattice => "lattice",
-        }
-    }
-
-    /// The backend of that name; `tets` for short.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|backend| backend.name() == name).or((name == "tets").then_some(Self::Tetrahedra))
-    }
-}
-
-/// A scene on tetrahedra is written as before there were others.
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
-fn is_tetrahedra(backend: &BackendName) -> bool {
-    *backend == BackendName::Tetrahedra
-}
-
-/// Laws of tissue on a lattice.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum LatticeLaw {
-    /// Rotated linear elasticity.
-    Corotated,
-    /// Stable neo-Hookean.
-    #[default]
-    StableNeoHookean,
-}
-
-/// The ground under the organs.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Support {
-    /// Its kind: imprint or none.
-    pub kind: SupportKind,
-    /// Coulomb friction of tissue on it.
-    pub friction: f64,
-}
-
-impl Default for Support {
-    fn default() -> Self {
-        Self { kind: SupportKind::Imprint, friction: 0.6 }
-    }
-}
-
-/// Kinds of support.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum SupportKind {
-    /// A surface under each organ that has its imprint.
-    #[default]
-    Imprint,
-    /// None: only pins hold the organs.
-    None,
 }

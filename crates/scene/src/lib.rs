@@ -29,12 +29,11 @@ mod stages;
 mod start;
 mod task;
 mod task_name;
+mod tissue;
+mod tissue_preset;
 mod variation;
 
-pub use anatomy::{
-    BackendName, FIELD, LatticeLaw, MaterialOverride, OrganOverride, PinEnd, PinRule, ScheduleName, Source,
-    SpecimenSource, Support, SupportKind, TOUGHNESS, Tissue, ToolContactKind,
-};
+pub use anatomy::{FIELD, MaterialOverride, OrganOverride, PinEnd, PinRule, Source, SpecimenSource, TOUGHNESS};
 pub use builtin::{BUILTINS, Builtin};
 pub use camera::{CellCamera, Lens, View};
 pub use cell::{Arm, ArmModel, Controller, Drive, FRANKA_FR3, Frame, GravityError, Instrument, InstrumentKind, Side};
@@ -54,4 +53,6 @@ pub use stages::{Abort, BUILTIN_TASKS, BuiltinTask, Definition, ScriptStep, Stag
 pub use start::Start;
 pub use task::{Gates, GraspDesignName, Safety, SafetyRules, Task};
 pub use task_name::TaskName;
+pub use tissue::{BackendName, LatticeLaw, ScheduleName, Support, SupportKind, Tissue, ToolContactKind};
+pub use tissue_preset::TissuePreset;
 pub use variation::{Distribution, Drawn, DrawnValue, Factor, Per, Specimens, Split, Variation, VariationSet};

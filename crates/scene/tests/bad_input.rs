@@ -181,6 +181,11 @@ fn units() {
         ),
         Case(
             "[organ.cecum.pins]",
+            "[organ.cecum.material]\npreset = \"livr§\"\n[organ.cecum.pins]",
+            "organ.cecum.material.preset: unknown variant `livr`, expected one of `appendix`, `liver`, `gallbladder`, `bile-duct`, `small-bowel`; did you mean `liver`?",
+        ),
+        Case(
+            "[organ.cecum.pins]",
             "[organ.cecum.material]\ntoughness_j_m2 = 0.3§\n[organ.cecum.pins]",
             "organ.cecum.material.toughness_j_m2 is 0.3; it must be in [1, 20000] J/m2; 0.3 kJ/m2 is 300 J/m2",
         ),

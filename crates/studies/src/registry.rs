@@ -1,14 +1,14 @@
 //! The list of all studies.
 
 use crate::bench::{
-    CellBench, EpisodeBench, GraspBench, MeshingBench, OrgansBench, RenderBench, ScalingBench, ViewBench,
+    CellBench, EpisodeBench, GraspBench, LiftBench, MeshingBench, OrgansBench, RenderBench, ScalingBench, ViewBench,
 };
 use crate::experiment::{
-    BeamExperiment, ContactExperiment, ControllerGridExperiment, ConvergenceExperiment, CutForceExperiment,
-    ElementQualityExperiment, GraspDesignsExperiment, IntegratorsExperiment, MeshConvergenceExperiment,
-    PortBudgetExperiment, PortRegraspExperiment, RandomActionsExperiment, ReconstructionExperiment,
-    RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment, TruthCubeExperiment,
-    WrenchExperiment,
+    BackendsExperiment, BeamExperiment, ContactExperiment, ControllerGridExperiment, ConvergenceExperiment,
+    CutForceExperiment, ElementQualityExperiment, GraspDesignsExperiment, IntegratorsExperiment,
+    MeshConvergenceExperiment, PortBudgetExperiment, PortRegraspExperiment, RandomActionsExperiment,
+    ReconstructionExperiment, RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment,
+    TruthCubeExperiment, WrenchExperiment,
 };
 use crate::study::{Entry, Of};
 
@@ -32,11 +32,13 @@ pub static STUDIES: &[&dyn Entry] = &[
     &Of::<RandomActionsExperiment>::NEW,
     &Of::<RolloutsExperiment>::NEW,
     &Of::<RobustnessExperiment>::NEW,
+    &Of::<BackendsExperiment>::NEW,
     &Of::<SimilarityExperiment>::NEW,
     &Of::<MeshingBench>::NEW,
     &Of::<OrgansBench>::NEW,
     &Of::<ScalingBench>::NEW,
     &Of::<GraspBench>::NEW,
+    &Of::<LiftBench>::NEW,
     &Of::<CellBench>::NEW,
     &Of::<EpisodeBench>::NEW,
     &Of::<RenderBench>::NEW,

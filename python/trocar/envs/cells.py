@@ -67,6 +67,7 @@ class Cells:
         sensor_noise: bool = False,
         variation: str | None = None,
         split: str = "seen",
+        backend: str | None = None,
     ):
         self.split = checked_split(split)
         self.kinds, self.in_dict = kinds_of(obs)
@@ -94,6 +95,7 @@ class Cells:
             sensor_noise=sensor_noise,
             variation=variation,
             split=split,
+            backend=backend,
         )
         self._native: NativeCells | None = native
         self.count, self.privileged, self.normalize = count, privileged, normalize

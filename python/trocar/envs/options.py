@@ -45,6 +45,7 @@ class Options(TypedDict, total=False):
     sensor_noise: bool
     variation: str | None
     split: str
+    backend: str | None
 
 
 def checked_int(name: str, value: Any, low: int, high: int) -> int:

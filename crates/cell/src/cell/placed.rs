@@ -59,7 +59,7 @@ impl Placed {
             let far = far_end(scene, &placed.organs[k], change.pins.as_ref())?;
             let organ = &mut placed.organs[k];
             organ.material = change.material.applied_to(organ.material);
-            toughness[k] = change.material.toughness_j_m2.unwrap_or(TOUGHNESS);
+            toughness[k] = change.material.toughness().unwrap_or(TOUGHNESS);
             if let Some(rule) = &change.pins {
                 organ.pins = rule.pins(far);
             }

@@ -18,6 +18,7 @@ pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Re
         seed: arguments.seed,
         variation: arguments.variation,
         backend: arguments.backends.first().copied(),
+        cell_mm: None,
         by: arguments.by.clone(),
         jobs: arguments.jobs,
         retry_failed: arguments.retry_failed,
@@ -26,7 +27,7 @@ pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Re
     };
     note_reach(&arguments.scene);
     if arguments.backends.len() > 1 {
-        let result = campaign.run_on(&arguments.backends, &arguments.output, progress)?;
+        let result = campaign.run_on(&arguments.backends, None, &arguments.output, progress)?;
         output::print(json, &result, |r| {
             format!("{}\n{}\n{}report {}", r.policies().text(), r.differences().text(), r.agreement().text(), r.report)
         });

@@ -13,6 +13,8 @@ use trocar_workflow::check_interrupted;
 pub struct Timing {
     /// Median wall time of a frame (ms).
     pub frame_ms_median: f64,
+    /// Mean wall time of a frame (ms).
+    pub frame_ms_mean: f64,
     /// The slowest frame (ms).
     pub frame_ms_worst: f64,
     /// 1/60 s over the median wall time of a frame.
@@ -58,6 +60,7 @@ impl Timing {
             }
         }
         let count = times.len().max(1) as f64;
+        timing.frame_ms_mean = 1e3 * times.iter().sum::<f64>() / count;
         let median = median(&mut times);
         timing.frames = times.len();
         timing.frame_ms_median = 1e3 * median;

@@ -1,6 +1,7 @@
 //! The paper's tables and figures: one file or folder each.
 
 mod appendix;
+mod backends;
 mod beam;
 mod block;
 mod contact;
@@ -22,6 +23,7 @@ mod similarity;
 mod truth_cube;
 mod wrench;
 
+pub use backends::BackendsExperiment;
 pub use beam::BeamExperiment;
 pub use contact::ContactExperiment;
 pub use controller_grid::ControllerGridExperiment;

@@ -138,6 +138,7 @@ impl Study for RolloutsExperiment {
             seed: self.seed,
             variation: Some(VariationSet::None),
             backend: None,
+            cell_mm: None,
             by: Vec::new(),
             jobs: self.jobs,
             retry_failed: false,

@@ -119,11 +119,10 @@ impl Setup {
     fn new(whole: &Whole, condition: Condition, material: Material) -> Result<Self> {
         let (mut scene, specimen) = (whole.scene(condition)?, whole.specimen(condition));
         appendix(&mut scene).material = MaterialOverride {
-            model: None,
             young_modulus_pa: Some(material.young_modulus_pa),
             poisson_ratio: Some(material.poisson_ratio),
             density_kg_m3: Some(material.density_kg_m3),
-            toughness_j_m2: None,
+            ..MaterialOverride::default()
         };
         let places = places(&scene, &specimen)?;
         Ok(Self { condition, scene, specimen, places })

@@ -39,8 +39,8 @@ const RATIOS: [f64; 3] = [0.45, 0.49, 0.499];
 /// elements, beside where a scanner saw them (Kerdok and others 2003).
 #[derive(Clone, Debug, Args)]
 pub struct TruthCubeExperiment {
-    /// The table of the beads (CSV): at rest, and under compressions that its second last line of
-    /// head names.
+    /// The beads (CSV): their places at rest, and under each compression. The line above the names
+    /// of the columns gives the strains.
     #[arg(long, value_name = "FILE", default_value = DATA)]
     pub data: PathBuf,
     /// Models in parallel; all threads by default. The figures do not depend on it.
