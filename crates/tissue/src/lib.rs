@@ -75,6 +75,7 @@ mod solver_set;
 mod state;
 mod stepper;
 mod support;
+mod threads;
 mod untangle;
 
 pub use backend::{Backend, LatticeSettings, Law};

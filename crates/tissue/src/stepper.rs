@@ -13,6 +13,10 @@ use crate::{
 };
 use glam::DVec3;
 
+/// A single body of fewer nodes is stepped on one thread: handing a small model to a pool costs more
+/// than a frame.
+const MIN_THREADED_NODES: usize = 4000;
+
 /// Advances states of one model.
 ///
 /// It owns all scratch memory: stepping allocates nothing but lists of contacts that become longer
@@ -42,7 +46,7 @@ use glam::DVec3;
 /// ```
 pub struct Stepper {
     dt: f64,
-    /// Whether a single body is worth several threads.
+    /// Whether a single body of any size is worth several threads.
     threaded_bodies: bool,
     threads: usize,
     /// None: the calling thread does the work.
@@ -112,8 +116,8 @@ impl Stepper {
                 "the model has another backend than the stepper's; make another stepper".to_owned(),
             ));
         }
-        // Handing a small model to a pool costs more than a frame.
-        let single_body = !self.threaded_bodies && model.bodies.len() == 1;
+        let is_small = |body: &Body| !self.threaded_bodies && body.len() < MIN_THREADED_NODES;
+        let single_body = model.bodies.len() == 1 && model.bodies.iter().all(is_small);
         let single_thread = self.threads == 1 || single_body;
         if single_thread {
             self.pool = None;

@@ -14,9 +14,13 @@ use crate::lanes::{Row, dot_rows};
 use crate::settings::{Descent, QuasiNewton, Start};
 use crate::state::BodyState;
 use crate::state::Source;
+use crate::threads::in_parts;
 use crate::{Body, Isa};
-use fearless_simd::{Level, Simd, SimdBase, dispatch, f32x4};
+use fearless_simd::{Level, SimdBase, dispatch, f32x4};
 use glam::Vec3A;
+
+/// Nodes whose gradient one thread sums up at once, if there are others.
+const MAX_NODES: usize = 1 << 11;
 
 /// Sweeps a substep for a body that the quasi-Newton steps gave up.
 const FALLBACK_SWEEPS: usize = 20;
@@ -272,24 +276,26 @@ impl QuasiNewtonSolver {
         }
     }
 
-    #[inline(always)]
-    pub(super) fn gradient_at<S: Simd>(&mut self, simd: S, h: f32) {
+    /// Writes the gradient of elements and inertia into the next gradient.
+    pub(super) fn gradient_at(&mut self, h: f32) {
         let inertia = 1.0 / (h * h);
-        let Self { iterate: Iterate { x, predictor, next_gradient, .. }, layout, elements, held, .. } = self;
-        for i in 0..layout.free {
-            if held[i] {
-                next_gradient[i] = [0.0; 4];
-                continue;
-            }
-            let x = f32x4::from_slice(simd, &x[i]);
-            let off = x - f32x4::from_slice(simd, &predictor[i]);
-            let mut sum = off * (layout.masses[i] * inertia);
-            let (first, end) = (layout.first_corner[i] as usize, layout.first_corner[i + 1] as usize);
-            for k in &layout.corners[first..end] {
-                sum += f32x4::from_slice(simd, &elements.corners[*k as usize]);
-            }
-            sum.store_slice(&mut next_gradient[i]);
-        }
+        let Self { iterate: Iterate { x, predictor, next_gradient, .. }, layout, elements, held, level, .. } = self;
+        in_parts(&mut next_gradient[..layout.free], MAX_NODES, |first, gradient| {
+            dispatch!(*level, simd => for (k, sum) in gradient.iter_mut().enumerate() {
+                let i = first + k;
+                if held[i] {
+                    *sum = [0.0; 4];
+                    continue;
+                }
+                let off = f32x4::from_slice(simd, &x[i]) - f32x4::from_slice(simd, &predictor[i]);
+                let mut all = off * (layout.masses[i] * inertia);
+                let (first, end) = (layout.first_corner[i] as usize, layout.first_corner[i + 1] as usize);
+                for k in &layout.corners[first..end] {
+                    all += f32x4::from_slice(simd, &elements.corners[*k as usize]);
+                }
+                all.store_slice(sum);
+            });
+        });
     }
 
     /// Accepts the next gradient, with the present limits of friction. The limits are constant

@@ -7,8 +7,12 @@ use crate::Body;
 use crate::inversion_guard::{KEPT_SHARE, MIN_SQUARED_LENGTH, MIN_VOLUME_RATIO, is_squeezed};
 use crate::lanes::{LANES, Mat3L, Row, Vec3L, add, apply, cross, dot, gather, load, scale, splat, store_rows, sub};
 use crate::material::{MAX_FREE_STRETCH_SQUARED, StretchEnergy};
+use crate::threads::has_threads;
 use fearless_simd::{Level, Simd, SimdBase, dispatch, f32x16};
 use std::collections::BTreeMap;
+
+/// Batches that one thread evaluates at once, if there are others.
+const MAX_BATCHES: usize = 256;
 
 /// Forces and volume ratios of the elements.
 pub(super) struct Elements {
@@ -48,37 +52,115 @@ impl Elements {
     /// whether an element has lost too much of its accepted volume.
     pub fn evaluate(&mut self, level: Level, layout: &Layout, at: &Iterate, h: f32) -> bool {
         self.in_place = false;
-        dispatch!(level, simd => if self.dashpots.is_empty() {
-            self.evaluate_with::<_, false>(simd, layout, &at.x, &at.start, h)
+        let Self { stress, limit, corners, ratios, trial, dashpots, .. } = self;
+        let kernel = Kernel { level, stress, limit: limit.as_ref(), at, h };
+        let found = kernel.evaluate(Block { batches: &layout.batches, ratios, dashpots, trial, corners });
+        self.stretched |= found.stretched;
+        found.squeezed
+    }
+
+    /// Accepts the positions of the last evaluation.
+    pub fn accept(&mut self) {
+        std::mem::swap(&mut self.ratios, &mut self.trial);
+    }
+
+    /// Calls `found` with the nodes of every element that is squeezed too far at the last
+    /// evaluation.
+    pub fn for_squeezed(&self, layout: &Layout, mut found: impl FnMut([u32; 4])) {
+        for (b, batch) in layout.batches.iter().enumerate() {
+            for lane in 0..LANES {
+                if is_squeezed(self.trial[b][lane], self.ratios[b][lane]) {
+                    found(batch.nodes.map(|nodes| nodes[lane]));
+                }
+            }
+        }
+    }
+}
+
+/// Elements with what is known and found of them, batch by batch.
+struct Block<'a> {
+    batches: &'a [Batch],
+    ratios: &'a [[f32; LANES]],
+    /// Empty without viscosity.
+    dashpots: &'a [[[f32; LANES]; 6]],
+    trial: &'a mut [[f32; LANES]],
+    corners: &'a mut [Row],
+}
+
+impl Block<'_> {
+    /// The batches before the one of number `at`, and the others.
+    fn split(self, at: usize) -> (Self, Self) {
+        let (batches, other_batches) = self.batches.split_at(at);
+        let (ratios, other_ratios) = self.ratios.split_at(at);
+        let (dashpots, other_dashpots) = self.dashpots.split_at(at.min(self.dashpots.len()));
+        let (trial, other_trial) = self.trial.split_at_mut(at);
+        let (corners, other_corners) = self.corners.split_at_mut(at * 4 * LANES);
+        (
+            Self { batches, ratios, dashpots, trial, corners },
+            Self {
+                batches: other_batches,
+                ratios: other_ratios,
+                dashpots: other_dashpots,
+                trial: other_trial,
+                corners: other_corners,
+            },
+        )
+    }
+}
+
+/// What an evaluation finds.
+#[derive(Clone, Copy)]
+struct Found {
+    /// Whether an element has lost too much of its accepted volume.
+    squeezed: bool,
+    /// Whether one may be stretched beyond the limit.
+    stretched: bool,
+}
+
+/// The evaluation of elements where the nodes are.
+struct Kernel<'a> {
+    level: Level,
+    stress: &'a Stress,
+    limit: Option<&'a StretchEnergy>,
+    at: &'a Iterate,
+    h: f32,
+}
+
+impl Kernel<'_> {
+    /// Evaluates a block, a large one in halves at once.
+    fn evaluate(&self, block: Block<'_>) -> Found {
+        let count = block.batches.len();
+        if count > MAX_BATCHES && has_threads() {
+            let (first, second) = block.split(count / 2);
+            let (a, b) = rayon::join(|| self.evaluate(first), || self.evaluate(second));
+            return Found { squeezed: a.squeezed || b.squeezed, stretched: a.stretched || b.stretched };
+        }
+        dispatch!(self.level, simd => if block.dashpots.is_empty() {
+            self.evaluate_with::<_, false>(simd, block)
         } else {
-            self.evaluate_with::<_, true>(simd, layout, &at.x, &at.start, h)
+            self.evaluate_with::<_, true>(simd, block)
         })
     }
 
-    /// The kernel. The dashpots need where the substep began: `start`.
+    /// The kernel. The dashpots need where the substep began.
     #[inline(always)]
-    fn evaluate_with<S: Simd, const VISCOUS: bool>(
-        &mut self,
-        simd: S,
-        layout: &Layout,
-        x: &[Row],
-        start: &[Row],
-        h: f32,
-    ) -> bool {
-        let (zero, rate) = (splat(simd, 0.0), splat(simd, 1.0 / h));
-        let mut squeezed = zero;
-        for (b, batch) in layout.batches.iter().enumerate() {
+    fn evaluate_with<S: Simd, const VISCOUS: bool>(&self, simd: S, block: Block<'_>) -> Found {
+        let Block { batches, ratios, dashpots, trial, corners } = block;
+        let Iterate { x, start, .. } = self.at;
+        let (zero, rate) = (splat(simd, 0.0), splat(simd, 1.0 / self.h));
+        let (mut squeezed, mut stretched) = (zero, false);
+        for (b, batch) in batches.iter().enumerate() {
             let edges = edges(simd, batch, x);
             let f = deformation(simd, batch, &edges);
             let ratio = dot(f[0], cross(f[1], f[2]));
-            ratio.store_slice(&mut self.trial[b]);
-            squeezed = simd.max_f32x16(squeezed, lack(simd, ratio, load(simd, &self.ratios[b])));
+            ratio.store_slice(&mut trial[b]);
+            squeezed = simd.max_f32x16(squeezed, lack(simd, ratio, load(simd, &ratios[b])));
             let mut p = self.stress.at(simd, &f, ratio);
             let square = dot(f[0], f[0]) + dot(f[1], f[1]) + dot(f[2], f[2]);
             if simd.any_true_mask32x16(simd.simd_gt_f32x16(square, splat(simd, MAX_FREE_STRETCH_SQUARED as f32)))
-                && let Some(limit) = &self.limit
+                && let Some(limit) = self.limit
             {
-                self.stretched = true;
+                stretched = true;
                 add_limit(simd, limit, &f, &mut p);
             }
             let volume = load(simd, &batch.volumes);
@@ -101,7 +183,7 @@ impl Elements {
                         (sub(from[j - 1], from[i - 1]), sub(edges[j - 1], edges[i - 1]))
                     };
                     let length = simd.max_f32x16(dot(before, before), splat(simd, MIN_SQUARED_LENGTH));
-                    let along = load(simd, &self.dashpots[b][k]) * rate * (dot(now, now) - length) / (length + length);
+                    let along = load(simd, &dashpots[b][k]) * rate * (dot(now, now) - length) / (length + length);
                     let force = scale(now, along);
                     forces[j - 1] = add(forces[j - 1], force);
                     if i == 0 {
@@ -111,30 +193,13 @@ impl Elements {
                     }
                 }
             }
-            let rows = &mut self.corners[b * 4 * LANES..(b + 1) * 4 * LANES];
+            let rows = &mut corners[b * 4 * LANES..(b + 1) * 4 * LANES];
             store_rows(simd, first, &mut rows[..LANES]);
             store_rows(simd, forces[0], &mut rows[LANES..2 * LANES]);
             store_rows(simd, forces[1], &mut rows[2 * LANES..3 * LANES]);
             store_rows(simd, forces[2], &mut rows[3 * LANES..]);
         }
-        simd.any_true_mask32x16(simd.simd_gt_f32x16(squeezed, zero))
-    }
-
-    /// Accepts the positions of the last evaluation.
-    pub fn accept(&mut self) {
-        std::mem::swap(&mut self.ratios, &mut self.trial);
-    }
-
-    /// Calls `found` with the nodes of every element that is squeezed too far at the last
-    /// evaluation.
-    pub fn for_squeezed(&self, layout: &Layout, mut found: impl FnMut([u32; 4])) {
-        for (b, batch) in layout.batches.iter().enumerate() {
-            for lane in 0..LANES {
-                if is_squeezed(self.trial[b][lane], self.ratios[b][lane]) {
-                    found(batch.nodes.map(|nodes| nodes[lane]));
-                }
-            }
-        }
+        Found { squeezed: simd.any_true_mask32x16(simd.simd_gt_f32x16(squeezed, zero)), stretched }
     }
 }
 

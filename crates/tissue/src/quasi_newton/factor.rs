@@ -112,6 +112,7 @@ impl Factor {
             let rows = panel.rows().iter().copied();
             tiles.push(level, panel.first(), width, rows, |r, c| inverse[width * c + r], |r, c| panel.below(r, c));
         }
+        tiles.end();
     }
 
     /// Adds the product of the matrix, without what holds or carries nodes, and `x`; nodes in the

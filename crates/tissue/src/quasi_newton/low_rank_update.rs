@@ -12,10 +12,14 @@
 
 use super::factor::Factor;
 use super::stiffened::{MAX_STIFFENED, Stiffened};
-use fearless_simd::Simd;
+use crate::threads::in_parts;
+use fearless_simd::{Simd, dispatch};
 
 /// Greatest number of nodes in the update.
 const MAX_NODES: usize = 16;
+
+/// Numbers of the solution that one thread corrects at once, if there are others.
+const MAX_NUMBERS: usize = 1 << 13;
 
 /// Greatest number of directions in the update.
 const MAX_DIRECTIONS: usize = 3 * MAX_NODES + MAX_STIFFENED;
@@ -223,7 +227,7 @@ impl LowRankUpdate {
 
     /// Turns the factor's solution `x` into that of the sum.
     #[inline(always)]
-    pub fn apply<S: Simd>(&mut self, _simd: S, x: &mut [f32]) {
+    pub fn apply<S: Simd>(&mut self, simd: S, x: &mut [f32]) {
         if !self.usable {
             return;
         }
@@ -238,20 +242,24 @@ impl LowRankUpdate {
             let known: f64 = (i + 1..n).map(|k| matrix[k * n + i] * shares[k]).sum();
             shares[i] = shares[i] / matrix[i * n + i] - known;
         }
-        let x = &mut x[..self.length];
         let (shares, of_stiffened) = shares.split_at(of_nodes);
-        for (place, shares) in self.places.iter().zip(shares.chunks_exact(3)) {
-            let columns = &self.columns[3 * place * self.length..3 * (place + 1) * self.length];
-            let (a, rest) = columns.split_at(self.length);
-            let (b, c) = rest.split_at(self.length);
-            let [s, t, u] = [shares[0] as f32, shares[1] as f32, shares[2] as f32];
-            for (((x, a), b), c) in x.iter_mut().zip(a).zip(b).zip(c) {
-                *x -= s * a + t * b + u * c;
-            }
-        }
-        for (column, share) in self.stiffened_columns.chunks_exact(self.length).zip(of_stiffened) {
-            let share = *share as f32;
-            x.iter_mut().zip(column).for_each(|(x, c)| *x -= share * c);
-        }
+        let (level, length) = (simd.level(), self.length);
+        in_parts(&mut x[..length], MAX_NUMBERS, |first, x| {
+            let count = x.len();
+            let part = |column: usize| column * length + first..column * length + first + count;
+            dispatch!(level, _simd => {
+                for (place, shares) in self.places.iter().zip(shares.chunks_exact(3)) {
+                    let [a, b, c] = [0, 1, 2].map(|c| &self.columns[part(3 * place + c)]);
+                    let [s, t, u] = [shares[0] as f32, shares[1] as f32, shares[2] as f32];
+                    for (((x, a), b), c) in x.iter_mut().zip(a).zip(b).zip(c) {
+                        *x -= s * a + t * b + u * c;
+                    }
+                }
+                for (k, share) in of_stiffened.iter().enumerate() {
+                    let (share, column) = (*share as f32, &self.stiffened_columns[part(k)]);
+                    x.iter_mut().zip(column).for_each(|(x, c)| *x -= share * c);
+                }
+            });
+        });
     }
 }

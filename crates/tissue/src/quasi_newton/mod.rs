@@ -35,6 +35,7 @@ mod sleeping;
 mod stiffened;
 mod stress;
 mod system;
+mod tile_parts;
 mod tiles;
 mod tool_stiffness;
 mod two_loop;

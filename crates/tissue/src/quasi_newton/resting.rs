@@ -33,8 +33,7 @@ impl QuasiNewtonSolver {
             iterate.next_gradient.copy_from_slice(&rest.gradient);
             return;
         }
-        let level = self.level;
-        dispatch!(level, simd => self.gradient_at(simd, h));
+        self.gradient_at(h);
         let Self { iterate, rest, .. } = self;
         if stays {
             rest.gradient.copy_from_slice(&iterate.next_gradient);

@@ -166,7 +166,7 @@ impl System {
     /// Turns the system with the tissue, nodes at `x`.
     pub fn update_warp(&mut self, level: Level, layout: &Layout, x: &[Row]) {
         let Self { warp, .. } = self;
-        dispatch!(level, simd => warp.update(simd, layout, x));
+        warp.update(level, layout, x);
     }
 
     /// direction = P^-1 direction, P being the stiffness at rest turned with the tissue.

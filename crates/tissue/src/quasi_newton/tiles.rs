@@ -8,11 +8,13 @@
 //! The backward half is the exact transpose of the forward half, tile by tile. So rounding the
 //! factor to 16 bits leaves the preconditioner symmetric and positive definite.
 
+use super::tile_parts::{Part, Parts};
+use crate::threads::for_each;
 use fearless_simd::{Level, Simd, SimdBase, SimdCvtFloat, dispatch, f32x16, i32x16};
 use std::ops::Range;
 
 /// Rows and columns of a tile.
-const TILE_SIZE: usize = 16;
+pub(super) const TILE_SIZE: usize = 16;
 
 /// Greatest number in 16 bits.
 const MAX_INT16: f32 = 32767.0;
@@ -27,21 +29,22 @@ struct Tile {
 }
 
 /// One supernode: columns `first..first + width` of the vector, rows below by number.
-struct Supernode {
-    first: usize,
+pub(super) struct Supernode {
+    pub first: usize,
     /// A multiple of 3.
-    width: usize,
-    /// Rows below its diagonal, as nodes, in `Tiles::rows`.
-    rows: Range<usize>,
-    /// Its tiles: by rows of tiles, those of the diagonal triangle first.
-    tiles: usize,
+    pub width: usize,
+    /// Rows below its diagonal, in `Tiles::rows`.
+    pub rows: Range<usize>,
+    /// Its first tile: by rows of tiles, those of the diagonal triangle first.
+    pub tiles: usize,
 }
 
 /// The packed factor.
 pub(super) struct Tiles {
     supernodes: Vec<Supernode>,
-    /// Nodes below the supernodes' diagonals.
+    /// The first of the three numbers of each node below the supernodes' diagonals.
     rows: Vec<u32>,
+    parts: Parts,
     tiles: Vec<Tile>,
     scales: Vec<f32>,
     /// Room for the longest column of row tiles.
@@ -55,7 +58,14 @@ fn covering(n: usize) -> usize {
 
 impl Tiles {
     pub fn new() -> Self {
-        Self { supernodes: Vec::new(), rows: Vec::new(), tiles: Vec::new(), scales: Vec::new(), buffer: Vec::new() }
+        Self {
+            supernodes: Vec::new(),
+            rows: Vec::new(),
+            parts: Parts::default(),
+            tiles: Vec::new(),
+            scales: Vec::new(),
+            buffer: Vec::new(),
+        }
     }
 
     /// Forgets all supernodes but keeps the memory.
@@ -78,7 +88,7 @@ impl Tiles {
         below: impl Fn(usize, usize) -> f32,
     ) {
         let begin = self.rows.len();
-        self.rows.extend(rows);
+        self.rows.extend(rows.map(|node| 3 * node));
         let height = 3 * (self.rows.len() - begin);
         self.supernodes.push(Supernode { first, width, rows: begin..self.rows.len(), tiles: self.tiles.len() });
         let columns = covering(width);
@@ -99,6 +109,17 @@ impl Tiles {
             }
         }
         self.buffer.resize(self.buffer.len().max(TILE_SIZE * (columns + covering(height)) + TILE_SIZE), 0.0);
+    }
+
+    /// Ends the factor after its last supernode.
+    pub fn end(&mut self) {
+        self.parts = Parts::cut(&mut self.supernodes, &mut self.rows, self.tiles.len(), self.buffer.len());
+    }
+
+    /// Parts that threads solve with at once; 0 if the factor is not cut.
+    #[cfg(test)]
+    pub fn parts(&self) -> usize {
+        self.parts.list.len()
     }
 
     fn pack(&mut self, level: Level, at: impl Fn(usize, usize) -> f32) {
@@ -131,14 +152,53 @@ impl Tiles {
     /// order of elimination, padded by at least 16.
     #[inline(always)]
     pub fn solve<S: Simd>(&mut self, simd: S, x: &mut [f32]) {
-        let mut buffer = std::mem::take(&mut self.buffer);
-        for supernode in &self.supernodes {
-            self.forward(simd, supernode, x, &mut buffer);
+        let (mut buffer, mut parts) = (std::mem::take(&mut self.buffer), std::mem::take(&mut self.parts));
+        if parts.list.is_empty() {
+            for supernode in &self.supernodes {
+                self.forward(simd, supernode, x, &mut buffer);
+            }
+            for supernode in self.supernodes.iter().rev() {
+                self.backward(simd, supernode, x, &mut buffer);
+            }
+        } else {
+            self.solve_parts(simd, &mut parts, x, &mut buffer);
         }
-        for supernode in self.supernodes.iter().rev() {
-            self.backward(simd, supernode, x, &mut buffer);
+        (self.buffer, self.parts) = (buffer, parts);
+    }
+
+    /// The same by parts.
+    #[inline(always)]
+    fn solve_parts<S: Simd>(&self, simd: S, parts: &mut Parts, x: &mut [f32], buffer: &mut [f32]) {
+        let (Parts { list, above, numbers }, level) = (parts, simd.level());
+        let whole = &*x;
+        for_each(list, |part| {
+            part.begin(whole);
+            let Part { supernodes, vector, buffer, .. } = part;
+            // Another thread has to ask for its instruction set itself.
+            dispatch!(level, simd => for s in &self.supernodes[supernodes.clone()] {
+                self.forward(simd, s, vector, buffer);
+            });
+        });
+        for part in &*list {
+            part.take_from(numbers, x);
         }
-        self.buffer = buffer;
+        for s in &*above {
+            self.forward(simd, &self.supernodes[*s], x, buffer);
+        }
+        for s in above.iter().rev() {
+            self.backward(simd, &self.supernodes[*s], x, buffer);
+        }
+        let whole = &*x;
+        for_each(list, |part| {
+            part.read(numbers, whole);
+            let Part { supernodes, vector, buffer, .. } = part;
+            dispatch!(level, simd => for s in self.supernodes[supernodes.clone()].iter().rev() {
+                self.backward(simd, s, vector, buffer);
+            });
+        });
+        for part in &*list {
+            part.end(x);
+        }
     }
 
     /// y = inverse b, and the rows below lose their product with y.
@@ -167,8 +227,8 @@ impl Tiles {
             }
             sum.store_slice(&mut below[TILE_SIZE * i..TILE_SIZE * (i + 1)]);
         }
-        for (k, node) in rows.iter().enumerate() {
-            let to = &mut x[3 * *node as usize..3 * *node as usize + 3];
+        for (k, row) in rows.iter().enumerate() {
+            let to = &mut x[*row as usize..*row as usize + 3];
             let by = &below[3 * k..3 * k + 3];
             for c in 0..3 {
                 to[c] -= by[c];
@@ -183,8 +243,8 @@ impl Tiles {
         let rows = &self.rows[s.rows.clone()];
         let tall = covering(3 * rows.len());
         let (z, below) = buffer.split_at_mut(TILE_SIZE * columns);
-        for (k, node) in rows.iter().enumerate() {
-            below[3 * k..3 * k + 3].copy_from_slice(&x[3 * *node as usize..3 * *node as usize + 3]);
+        for (k, row) in rows.iter().enumerate() {
+            below[3 * k..3 * k + 3].copy_from_slice(&x[*row as usize..*row as usize + 3]);
         }
         below[3 * rows.len()..TILE_SIZE * tall].fill(0.0);
         let triangle = s.tiles;

@@ -3,7 +3,8 @@
 
 use super::layout::Layout;
 use crate::lanes::{LANES, Mat3L, Row, apply, apply_transposed, load, load_rows, rotation, store_rows};
-use fearless_simd::{Simd, SimdBase, f32x4};
+use crate::threads::in_parts;
+use fearless_simd::{Level, Simd, SimdBase, dispatch, f32x4};
 
 /// Sixteen nodes' rotations.
 #[derive(Clone)]
@@ -17,6 +18,9 @@ pub(super) struct Warp {
     nodes: Vec<Sixteen>,
 }
 
+/// Groups of sixteen nodes that one thread turns at once, if there are others.
+const MAX_GROUPS: usize = 128;
+
 /// A neighbourhood squeezed below this volume ratio has no reliable rotation.
 const MIN_VOLUME_RATIO: f32 = 0.01;
 
@@ -27,40 +31,10 @@ impl Warp {
     }
 
     /// Computes the rotations at `x` from scratch: they do not depend on the past.
-    #[inline(always)]
-    pub fn update<S: Simd>(&mut self, simd: S, layout: &Layout, x: &[Row]) {
-        for (group, sixteen) in self.nodes.iter_mut().enumerate() {
-            // Rows of F by lane; the identity for what fills the last group up.
-            let mut f = [[[0.0; 4]; LANES]; 3];
-            for lane in 0..LANES {
-                let i = group * LANES + lane;
-                if i >= layout.free {
-                    f[0][lane][0] = 1.0;
-                    f[1][lane][1] = 1.0;
-                    f[2][lane][2] = 1.0;
-                    continue;
-                }
-                let here = f32x4::from_slice(simd, &x[i]);
-                let mut columns = [f32x4::splat(simd, 0.0); 3];
-                for k in layout.first_neighbour[i] as usize..layout.first_neighbour[i + 1] as usize {
-                    let offset = f32x4::from_slice(simd, &x[layout.neighbours[k] as usize]) - here;
-                    let weight = &layout.weights[k];
-                    columns[0] += offset * weight[0];
-                    columns[1] += offset * weight[1];
-                    columns[2] += offset * weight[2];
-                }
-                columns[0].store_slice(&mut f[0][lane]);
-                columns[1].store_slice(&mut f[1][lane]);
-                columns[2].store_slice(&mut f[2][lane]);
-            }
-            let f = [load_rows(simd, &f[0]), load_rows(simd, &f[1]), load_rows(simd, &f[2])];
-            let r = rotation(simd, &f, MIN_VOLUME_RATIO);
-            for c in 0..3 {
-                for k in 0..3 {
-                    r[c][k].store_slice(&mut sixteen.columns[c][k]);
-                }
-            }
-        }
+    pub fn update(&mut self, level: Level, layout: &Layout, x: &[Row]) {
+        in_parts(&mut self.nodes, MAX_GROUPS, |first, nodes| {
+            dispatch!(level, simd => update(simd, layout, x, first, nodes));
+        });
     }
 
     /// Turns one vector of a node into its rest frame.
@@ -114,5 +88,43 @@ impl Sixteen {
             [load(simd, &b[0]), load(simd, &b[1]), load(simd, &b[2])],
             [load(simd, &c[0]), load(simd, &c[1]), load(simd, &c[2])],
         ]
+    }
+}
+
+/// Computes the rotations of `nodes`, of which the first has this number, at `x`.
+#[inline(always)]
+fn update<S: Simd>(simd: S, layout: &Layout, x: &[Row], first: usize, nodes: &mut [Sixteen]) {
+    for (k, sixteen) in nodes.iter_mut().enumerate() {
+        let group = first + k;
+        // Rows of F by lane; the identity for what fills the last group up.
+        let mut f = [[[0.0; 4]; LANES]; 3];
+        for lane in 0..LANES {
+            let i = group * LANES + lane;
+            if i >= layout.free {
+                f[0][lane][0] = 1.0;
+                f[1][lane][1] = 1.0;
+                f[2][lane][2] = 1.0;
+                continue;
+            }
+            let here = f32x4::from_slice(simd, &x[i]);
+            let mut columns = [f32x4::splat(simd, 0.0); 3];
+            for k in layout.first_neighbour[i] as usize..layout.first_neighbour[i + 1] as usize {
+                let offset = f32x4::from_slice(simd, &x[layout.neighbours[k] as usize]) - here;
+                let weight = &layout.weights[k];
+                columns[0] += offset * weight[0];
+                columns[1] += offset * weight[1];
+                columns[2] += offset * weight[2];
+            }
+            columns[0].store_slice(&mut f[0][lane]);
+            columns[1].store_slice(&mut f[1][lane]);
+            columns[2].store_slice(&mut f[2][lane]);
+        }
+        let f = [load_rows(simd, &f[0]), load_rows(simd, &f[1]), load_rows(simd, &f[2])];
+        let r = rotation(simd, &f, MIN_VOLUME_RATIO);
+        for c in 0..3 {
+            for k in 0..3 {
+                r[c][k].store_slice(&mut sixteen.columns[c][k]);
+            }
+        }
     }
 }
