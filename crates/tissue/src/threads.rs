@@ -3,6 +3,9 @@
 
 use rayon::prelude::*;
 
+/// Parts that items are divided into, at most.
+const MAX_PARTS: usize = 8;
+
 /// Whether the caller is in a pool of several threads.
 pub(crate) fn has_threads() -> bool {
     rayon::current_thread_index().is_some() && rayon::current_num_threads() > 1
@@ -17,12 +20,13 @@ pub(crate) fn for_each<T: Send>(items: &mut [T], work: impl Fn(&mut T) + Send + 
     }
 }
 
-/// Calls `work` with parts of at most `most` items, and the number of each part's first one.
-pub(crate) fn in_parts<T: Send>(items: &mut [T], most: usize, work: impl Fn(usize, &mut [T]) + Send + Sync) {
-    let work = |(k, part): (usize, &mut [T])| work(k * most, part);
-    if items.len() > most && has_threads() {
-        items.par_chunks_mut(most).enumerate().for_each(work);
-    } else {
-        items.chunks_mut(most).enumerate().for_each(work);
+/// Calls `work` with parts of at least `least` items, at most eight of equal size, and the number of
+/// each part's first one.
+pub(crate) fn in_parts<T: Send>(items: &mut [T], least: usize, work: impl Fn(usize, &mut [T]) + Send + Sync) {
+    let parts = (items.len() / least).clamp(1, MAX_PARTS);
+    if parts == 1 || !has_threads() {
+        return work(0, items);
     }
+    let size = items.len().div_ceil(parts);
+    items.par_chunks_mut(size).enumerate().for_each(|(k, part)| work(k * size, part));
 }

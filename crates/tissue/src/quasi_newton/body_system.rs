@@ -19,8 +19,8 @@ use crate::{Body, Isa};
 use fearless_simd::{Level, SimdBase, dispatch, f32x4};
 use glam::Vec3A;
 
-/// Nodes whose gradient one thread sums up at once, if there are others.
-const MAX_NODES: usize = 1 << 11;
+/// Fewest nodes whose gradient is worth a thread of its own.
+const MIN_NODES: usize = 2500;
 
 /// Sweeps a substep for a body that the quasi-Newton steps gave up.
 const FALLBACK_SWEEPS: usize = 20;
@@ -280,7 +280,7 @@ impl QuasiNewtonSolver {
     pub(super) fn gradient_at(&mut self, h: f32) {
         let inertia = 1.0 / (h * h);
         let Self { iterate: Iterate { x, predictor, next_gradient, .. }, layout, elements, held, level, .. } = self;
-        in_parts(&mut next_gradient[..layout.free], MAX_NODES, |first, gradient| {
+        in_parts(&mut next_gradient[..layout.free], MIN_NODES, |first, gradient| {
             dispatch!(*level, simd => for (k, sum) in gradient.iter_mut().enumerate() {
                 let i = first + k;
                 if held[i] {

@@ -11,8 +11,8 @@ use crate::threads::has_threads;
 use fearless_simd::{Level, Simd, SimdBase, dispatch, f32x16};
 use std::collections::BTreeMap;
 
-/// Batches that one thread evaluates at once, if there are others.
-const MAX_BATCHES: usize = 256;
+/// Fewest batches that are worth a thread of their own.
+const MIN_BATCHES: usize = 600;
 
 /// Forces and volume ratios of the elements.
 pub(super) struct Elements {
@@ -130,7 +130,7 @@ impl Kernel<'_> {
     /// Evaluates a block, a large one in halves at once.
     fn evaluate(&self, block: Block<'_>) -> Found {
         let count = block.batches.len();
-        if count > MAX_BATCHES && has_threads() {
+        if count >= 2 * MIN_BATCHES && has_threads() {
             let (first, second) = block.split(count / 2);
             let (a, b) = rayon::join(|| self.evaluate(first), || self.evaluate(second));
             return Found { squeezed: a.squeezed || b.squeezed, stretched: a.stretched || b.stretched };

@@ -18,8 +18,8 @@ use fearless_simd::{Simd, dispatch};
 /// Greatest number of nodes in the update.
 const MAX_NODES: usize = 16;
 
-/// Numbers of the solution that one thread corrects at once, if there are others.
-const MAX_NUMBERS: usize = 1 << 13;
+/// Fewest numbers of the solution whose correction is worth a thread of its own.
+const MIN_NUMBERS: usize = 7500;
 
 /// Greatest number of directions in the update.
 const MAX_DIRECTIONS: usize = 3 * MAX_NODES + MAX_STIFFENED;
@@ -244,7 +244,7 @@ impl LowRankUpdate {
         }
         let (shares, of_stiffened) = shares.split_at(of_nodes);
         let (level, length) = (simd.level(), self.length);
-        in_parts(&mut x[..length], MAX_NUMBERS, |first, x| {
+        in_parts(&mut x[..length], MIN_NUMBERS, |first, x| {
             let count = x.len();
             let part = |column: usize| column * length + first..column * length + first + count;
             dispatch!(level, _simd => {

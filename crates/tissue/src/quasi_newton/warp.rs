@@ -18,8 +18,8 @@ pub(super) struct Warp {
     nodes: Vec<Sixteen>,
 }
 
-/// Groups of sixteen nodes that one thread turns at once, if there are others.
-const MAX_GROUPS: usize = 128;
+/// Fewest groups of sixteen nodes that are worth a thread of their own.
+const MIN_GROUPS: usize = 160;
 
 /// A neighbourhood squeezed below this volume ratio has no reliable rotation.
 const MIN_VOLUME_RATIO: f32 = 0.01;
@@ -32,7 +32,7 @@ impl Warp {
 
     /// Computes the rotations at `x` from scratch: they do not depend on the past.
     pub fn update(&mut self, level: Level, layout: &Layout, x: &[Row]) {
-        in_parts(&mut self.nodes, MAX_GROUPS, |first, nodes| {
+        in_parts(&mut self.nodes, MIN_GROUPS, |first, nodes| {
             dispatch!(level, simd => update(simd, layout, x, first, nodes));
         });
     }
