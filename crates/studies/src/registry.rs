@@ -5,10 +5,10 @@ use crate::bench::{
 };
 use crate::experiment::{
     BeamExperiment, ContactExperiment, ControllerGridExperiment, ConvergenceExperiment, CutForceExperiment,
-    ElementQualityExperiment, GraspDesignsExperiment, IntegratorsExperiment, MeshConvergenceExperiment,
-    PortBudgetExperiment, PortRegraspExperiment, RandomActionsExperiment, ReconstructionExperiment,
-    RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment, TruthCubeExperiment,
-    WrenchExperiment,
+    ElementQualityExperiment, GraspDesignsExperiment, IntegratorsExperiment, LiftsExperiment,
+    MeshConvergenceExperiment, PortBudgetExperiment, PortRegraspExperiment, RandomActionsExperiment,
+    ReconstructionExperiment, RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment,
+    TruthCubeExperiment, WrenchExperiment,
 };
 use crate::study::{Entry, Of};
 
@@ -33,6 +33,7 @@ pub static STUDIES: &[&dyn Entry] = &[
     &Of::<RolloutsExperiment>::NEW,
     &Of::<RobustnessExperiment>::NEW,
     &Of::<SimilarityExperiment>::NEW,
+    &Of::<LiftsExperiment>::NEW,
     &Of::<MeshingBench>::NEW,
     &Of::<OrgansBench>::NEW,
     &Of::<ScalingBench>::NEW,
