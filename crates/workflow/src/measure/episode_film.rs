@@ -8,8 +8,11 @@ use trocar_camera::{Camera, Mask};
 use trocar_core::{Pose, Silent};
 use trocar_measure::Film;
 use trocar_recording::RgbdFrame;
-use trocar_render::RenderSettings;
+use trocar_render::{Picture, RenderSettings};
 use trocar_sensors::is_tool;
+
+/// What is done with a picture and the names of its labels.
+type Show<'a> = dyn FnMut(&[(u16, String)], &Picture) -> Result<()> + 'a;
 
 /// An episode through one of its scene's cameras, a frame per control period.
 pub(crate) struct EpisodeFilm {
@@ -56,8 +59,8 @@ impl EpisodeFilm {
     pub fn organ_mask(&mut self, frame: usize) -> Result<Mask> {
         let mut mask = Mask::new(self.size[0], self.size[1]);
         let organ = self.organ.clone();
-        self.show(frame..=frame, &mut |episode, picture| {
-            let label = episode.iter().find(|(_, name)| *name == organ).map(|(label, _)| *label);
+        self.show(frame..=frame, &mut |labels, picture| {
+            let label = labels.iter().find(|(_, name)| *name == organ).map(|(label, _)| *label);
             mask.set.iter_mut().zip(&picture.labels).for_each(|(set, l)| *set = Some(*l) == label);
             Ok(())
         })?;
@@ -65,11 +68,7 @@ impl EpisodeFilm {
     }
 
     /// Shows pictures with the names of their labels.
-    fn show(
-        &self,
-        frames: RangeInclusive<usize>,
-        show: &mut dyn FnMut(&[(u16, String)], &trocar_render::Picture) -> Result<()>,
-    ) -> Result<()> {
+    fn show(&self, frames: RangeInclusive<usize>, show: &mut Show<'_>) -> Result<()> {
         let settings = RenderSettings::preview();
         let mut episode = RecordedEpisode::open(&self.folder, self.specimen.as_deref(), &self.phantoms, &Silent)?;
         for index in 0..=*frames.end() {
