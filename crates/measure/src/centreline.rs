@@ -44,8 +44,8 @@ pub struct Centreline {
 }
 
 impl Centreline {
-    /// The centreline of the part of `mask` that holds the pixel `click`. It begins at the end nearer
-    /// to `base` (px), or else at the one nearer to the middle of the picture.
+    /// The centreline of the part of `mask` that holds the pixel `click`. It begins at the end
+    /// nearer to `base` (px), or else at the one nearer to the middle of the picture.
     ///
     /// # Errors
     /// Says why the mask has no centreline.

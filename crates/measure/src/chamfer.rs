@@ -6,7 +6,8 @@ use glam::DVec3;
 pub const LOCAL: f64 = 0.025;
 
 /// The symmetric Chamfer distance (m): the mean distance to the nearest point of the other set, of
-/// both directions averaged (Barrow and others 1977; Fan and others 2017). `None` if a set is empty.
+/// both directions averaged (Barrow and others 1977; Fan and others 2017). `None` if a set is
+/// empty.
 pub fn chamfer(a: &[DVec3], b: &[DVec3]) -> Option<f64> {
     let one_way = |from: &[DVec3], to: &[DVec3]| {
         let nearest = |p: &DVec3| to.iter().map(|q| p.distance_squared(*q)).fold(f64::INFINITY, f64::min).sqrt();

@@ -8,8 +8,8 @@ use trocar_core::median;
 /// Places from landmark to landmark.
 const EVERY: usize = 5;
 
-/// A landmark is the middle of the points this many places around it, and this near to the middle of
-/// the organ in half widths.
+/// A landmark is the middle of the points this many places around it, and this near to the middle
+/// of the organ in half widths.
 const AROUND: usize = 1;
 const ACROSS: f64 = 0.3;
 

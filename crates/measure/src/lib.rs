@@ -1,4 +1,5 @@
-//! Measures grasp-lifts in films of colour and depth, of recordings and of simulated episodes alike.
+//! Measures grasp-lifts in films of colour and depth, of recordings and of simulated episodes
+//! alike.
 //!
 //! A [`MeasuredLift`] needs the frames of a lift, the organ's mask at rest and one click on it. It
 //! tracks points of the organ's front, and gives the lift along the organ over the plane of its

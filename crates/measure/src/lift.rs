@@ -66,8 +66,8 @@ pub struct MeasuredLift {
 }
 
 impl MeasuredLift {
-    /// Measures the lift `info` in `film`. `mask` shows the organ at rest; its base is near the pixel
-    /// `base`.
+    /// Measures the lift `info` in `film`. `mask` shows the organ at rest; its base is near the
+    /// pixel `base`.
     ///
     /// # Errors
     /// A film that cannot be read, an organ without centreline or surroundings, an interruption.

@@ -23,8 +23,8 @@ pub struct LiftProfile {
 }
 
 impl LiftProfile {
-    /// The profile of lifts (m) at places `spacing` (m) apart; `None` where a place is hidden. `None`
-    /// if fewer than two places are seen or nothing rises.
+    /// The profile of lifts (m) at places `spacing` (m) apart; `None` where a place is hidden.
+    /// `None` if fewer than two places are seen or nothing rises.
     pub fn of(lifts: &[Option<f64>], spacing: f64) -> Option<Self> {
         let lift = smooth(lifts)?;
         let seen: Vec<bool> = lifts.iter().map(Option::is_some).collect();

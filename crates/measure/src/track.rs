@@ -36,7 +36,8 @@ const OPTIONS: TrackOptions = TrackOptions::new().with_kernel(TrackKernel::Fixed
 pub struct Tracks {
     /// The frames, the one at rest first.
     pub frames: Vec<usize>,
-    /// Per frame and point: where it is in the camera's frame (m); `None` where it is hidden or lost.
+    /// Per frame and point: where it is in the camera's frame (m); `None` where it is hidden or
+    /// lost.
     pub points: Vec<Vec<Option<DVec3>>>,
 }
 

@@ -71,7 +71,8 @@ impl Default for LiftOptions {
 ///
 /// # Errors
 /// The name is unknown, the number of frames or lifts is out of range, the phantom has no appendix
-/// to lift, the folder cannot be written, or the user interrupts. The folder is removed in these cases.
+/// to lift, the folder cannot be written, or the user interrupts. The folder is removed in these
+/// cases.
 pub fn record(name: &str, options: &RecordOptions, dir: &Path, progress: &dyn Progress) -> Result<()> {
     let spec = catalog::named(name)?;
     record_with(spec, options, &Camera::d405(), spec.resolution, dir, progress)

@@ -2,8 +2,8 @@
 //!
 //! The tissue of the lifts is another one than that of the simulation, so that a comparison with
 //! them proves something: a mesh of half the edge length, corotated elasticity of another modulus,
-//! supports that the camera does not see, and equilibria by the oracle. The lifted organ touches its
-//! bed, but not the other organs. It has no shadow in the creases while it is lifted.
+//! supports that the camera does not see, and equilibria by the oracle. The lifted organ touches
+//! its bed, but not the other organs. It has no shadow in the creases while it is lifted.
 
 mod script;
 mod support;
@@ -46,7 +46,8 @@ const CLICK: f64 = 0.5;
 /// Distance between tracked points of the centreline (m).
 const TRACK_SPACING: f64 = 1e-3;
 
-/// The jaws reach this far beyond the middle of the held tissue (m). They come open and close (rad).
+/// The jaws reach this far beyond the middle of the held tissue (m). They come open and close
+/// (rad).
 const BEYOND: f64 = 3e-3;
 const OPEN: f64 = 0.6;
 const CLOSED: f64 = 0.18;

@@ -32,8 +32,8 @@ const COARSEST: u32 = 2;
 /// Distance between the threads of a support along the organ (m).
 const THREAD_SPACING: f64 = 2e-3;
 
-/// Longest way of the grasp point between two equilibria (m), and the share of it below which a lift
-/// ends where it is.
+/// Longest way of the grasp point between two equilibria (m), and the share of it below which a
+/// lift ends where it is.
 const STEP: f64 = 4e-3;
 const LEAST_STEP_SHARE: f64 = 0.2;
 
@@ -113,8 +113,8 @@ impl Tissue {
         Ok(Self { mesh, axis, young_modulus, density: spec.density, settled, up, model, oracle, state })
     }
 
-    /// The point of the organ's front above its centreline at `s`, where it lies (m): what the camera
-    /// sees of the centreline.
+    /// The point of the organ's front above its centreline at `s`, where it lies (m): what the
+    /// camera sees of the centreline.
     pub fn front_at(&self, surface: &dyn SignedDistance, s: f64) -> DVec3 {
         let point = self.axis.point_at(s);
         let ray = point.normalize_or(DVec3::Z);
@@ -170,8 +170,8 @@ impl Tissue {
         Ok(SolvedLift { grasp, way: reached * whole, keys })
     }
 
-    /// Where the nodes may be at a share of the way (m): as far as the last two equilibria continue, or
-    /// moved as a bulge about the grasp, if there is only one.
+    /// Where the nodes may be at a share of the way (m): as far as the last two equilibria
+    /// continue, or moved as a bulge about the grasp, if there is only one.
     fn guess(&self, keys: &[(f64, Vec<DVec3>)], share: f64, at: f64, whole: DVec3, held: &[Held]) -> Vec<DVec3> {
         let (last, here) = &keys[keys.len() - 1];
         let mut guess: Vec<DVec3> = match keys.len().checked_sub(2).map(|k| &keys[k]) {

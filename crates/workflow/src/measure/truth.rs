@@ -12,8 +12,8 @@ use trocar_phantom::LiftTruth;
 /// A measured lift beside its truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LiftTruthFigures {
-    /// Median distance of tracked points from where they are, over all points and frames of the lift
-    /// (mm).
+    /// Median distance of tracked points from where they are, over all points and frames of the
+    /// lift (mm).
     pub tracking_error_mm_median: Option<f64>,
     /// 95th percentile of these distances (mm).
     pub tracking_error_mm_p95: Option<f64>,

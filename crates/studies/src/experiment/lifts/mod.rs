@@ -193,8 +193,8 @@ impl LiftsExperiment {
 }
 
 impl Reproduced {
-    /// Aligns the centreline of a lift at rest with that of the specimen (SPEC of the paper: rigidly,
-    /// places of the same arc length). `None` if too little of the lift is seen.
+    /// Aligns the centreline of a lift at rest with that of the specimen (paper section VII-F:
+    /// rigidly, places of the same arc length). `None` if too little of the lift is seen.
     fn of(lift: MeasuredLift, appendix: &Appendix) -> Option<Self> {
         let (profile, apex) = (lift.profile.as_ref()?, lift.apex?);
         let stations = &lift.centreline.stations;

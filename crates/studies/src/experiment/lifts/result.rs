@@ -79,7 +79,8 @@ pub struct LiftsResult {
     /// The larger distance of the simulated d50 from the paper's line at 15 and 30 mm, with the
     /// specimen's own pins and modulus (mm).
     pub d50_residual_mm: Option<f64>,
-    /// Median landmark error of the reproduced lifts, with the specimen's own pins and modulus (mm).
+    /// Median landmark error of the reproduced lifts, with the specimen's own pins and modulus
+    /// (mm).
     pub landmark_rmse_mm: Option<f64>,
     /// Median landmark difference between two frames at the peak (mm).
     pub landmark_floor_mm: Option<f64>,
