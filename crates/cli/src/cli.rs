@@ -3,6 +3,7 @@
 mod episode;
 mod evaluate;
 mod export;
+mod measure;
 mod render;
 mod scene;
 mod specimens;
@@ -13,12 +14,13 @@ mod view;
 pub use episode::*;
 pub use evaluate::*;
 pub use export::*;
+pub use measure::*;
 pub use render::*;
 pub use scene::*;
 pub use specimens::*;
 pub use study::*;
 pub use task::*;
-pub use trocar_studies::names::{BackName, DesignName, MesherName, SensorName, SolverName, Units};
+pub use trocar_studies::names::{BackName, DesignName, MesherName, SensorName, SolverName, SupportName, Units};
 pub use view::*;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -53,6 +55,9 @@ pub enum Command {
     Specimens(Specimens),
     /// Describe a recording: frames, cameras, depth, organs, and what is missing.
     Inspect(Inspect),
+    /// Measure grasp-lifts of a recording or an episode: lift profile, half-drop distance,
+    /// landmarks.
+    Measure(Measure),
     /// Make masks of a recording: organs by SAM 2.1 from points, instruments by the appearance of
     /// metal or followed by SAM 2.1.
     Segment(Segment),
@@ -146,6 +151,13 @@ pub struct Record {
     /// Kind of depth noise.
     #[arg(long, value_enum, default_value_t = SensorName::Plain)]
     pub sensor: SensorName,
+    /// Grasp-lifts of the appendix after these frames: 80 frames each, 11 to 38 mm. Phantoms A and
+    /// B have an appendix. Their truth is in truth/lifts.toml.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub lifts: usize,
+    /// What holds the lifted appendix besides its bed. The camera does not see it.
+    #[arg(long, value_enum, default_value_t = SupportName::Mesentery)]
+    pub support: SupportName,
 }
 
 #[derive(Debug, Args)]

@@ -31,4 +31,7 @@ pub enum Error {
     /// A mesh cannot be written.
     #[error(transparent)]
     Geometry(#[from] trocar_geometry::Error),
+    /// The lifted tissue has no equilibrium.
+    #[error("lifted tissue: {0}")]
+    Tissue(#[from] trocar_tissue_reference::Error),
 }

@@ -35,19 +35,41 @@ pub(crate) struct FrameSettings<'a> {
     pub seed: u64,
 }
 
+/// Something that is drawn in front of the static view.
+pub(crate) struct Layer {
+    pub mesh: TriMesh,
+    pub shading: Shading,
+    /// Whether the instrument mask holds its pixels.
+    pub instrument: bool,
+}
+
+/// The shading of an instrument.
+pub(crate) const METAL: Shading = Shading { color: [160; 3], gloss: 0.8, wireframe: false };
+
 /// Renders and records frame `index`.
 pub(crate) fn record_frame(still: &StaticView, take: &FrameSettings<'_>, index: usize) -> RecordedFrame {
-    let FrameSettings { instruments, camera, sensor, seed } = *take;
+    let time = index as f64 / RATE_HZ;
+    let layer = |i: &Instrument| Layer { mesh: i.mesh(time), shading: METAL, instrument: true };
+    record_layers(still, take, take.instruments.iter().map(layer), index)
+}
+
+/// Renders and records frame `index` with `layers` in front of the static view.
+pub(crate) fn record_layers(
+    still: &StaticView,
+    take: &FrameSettings<'_>,
+    layers: impl IntoIterator<Item = Layer>,
+    index: usize,
+) -> RecordedFrame {
+    let FrameSettings { camera, sensor, seed, .. } = *take;
     let mut canvas = Canvas {
         color: still.frame.color.clone(),
         depth: still.frame.depth.clone(),
         facing: still.frame.facing.clone(),
         instruments: Mask::new(camera.width, camera.height),
     };
-    for instrument in instruments {
-        let mesh = instrument.mesh(index as f64 / RATE_HZ);
-        if let Some(window) = Window::around(&mesh, camera) {
-            window.draw(mesh, camera, still.lamp_distance, &mut canvas);
+    for layer in layers {
+        if let Some(window) = Window::around(&layer.mesh, camera) {
+            window.draw(layer, camera, still.lamp_distance, &mut canvas);
         }
     }
     let Canvas { mut color, mut depth, facing, instruments } = canvas;
@@ -116,11 +138,10 @@ impl Window {
         }
     }
 
-    /// Draws the instrument in front of the canvas. Its rim is blended by the share of rays that
-    /// hit.
-    fn draw(&self, mesh: TriMesh, camera: &Camera, lamp_distance: f32, canvas: &mut Canvas) {
+    /// Draws the layer in front of the canvas. Its rim is blended by the share of rays that hit.
+    fn draw(&self, layer: Layer, camera: &Camera, lamp_distance: f32, canvas: &mut Canvas) {
         let Canvas { color, depth, facing, instruments } = canvas;
-        let shading = Shading { color: [160; 3], gloss: 0.8, wireframe: false };
+        let Layer { mesh, shading, instrument } = layer;
         let scene = PhongScene::new(vec![Instance { mesh, label: 1, shading }], None, [0; 3]);
         let centres = scene.render(&self.camera(camera, 1), &Pose::IDENTITY, 1);
         let fine = scene.render(&self.camera(camera, SAMPLES), &Pose::IDENTITY, 1);
@@ -151,7 +172,7 @@ impl Window {
                 if before(z) {
                     depth.depth[i] = z;
                     facing[i] = centres.facing[v * self.width + u];
-                    instruments.set[i] = true;
+                    instruments.set[i] |= instrument;
                 }
             }
         }
@@ -173,7 +194,7 @@ mod tests {
                 facing: vec![0.0; camera.width * camera.height],
                 instruments: Mask::new(camera.width, camera.height),
             };
-            window.draw(mesh, &camera, 0.15, &mut canvas);
+            window.draw(Layer { mesh, shading: METAL, instrument: true }, &camera, 0.15, &mut canvas);
             (canvas.color, canvas.instruments)
         };
         for frame in (0..180).step_by(20) {

@@ -66,17 +66,36 @@ impl Instrument {
             swing(self.period.z, self.phase.z),
         );
         let Sweep { port, centre, amplitude } = self.sweep;
-        let tip = centre + amplitude * offset;
-        let x = (tip - port).normalize();
         let roll = 0.5 * swing(self.period.x * 1.7, 0.0);
+        let opening = 0.28 + 0.22 * swing(self.period.y * 0.8, 1.0);
+        Posture { scale: self.scale, port, tip: centre + amplitude * offset, roll, opening }.mesh()
+    }
+}
+
+/// Where an instrument is.
+pub(crate) struct Posture {
+    /// Size relative to an instrument with a 5 mm shaft.
+    pub scale: f64,
+    /// Where the shaft passes the abdominal wall, and the tip (m).
+    pub port: DVec3,
+    pub tip: DVec3,
+    /// Turn about the shaft, and angle between the blades (rad).
+    pub roll: f64,
+    pub opening: f64,
+}
+
+impl Posture {
+    /// Surface of the instrument, in the camera frame.
+    pub fn mesh(&self) -> TriMesh {
+        let Self { scale, port, tip, roll, opening } = *self;
+        let x = (tip - port).normalize();
         let y = DVec3::Z.cross(x).normalize();
         let (y, z) = (y * roll.cos() + x.cross(y) * roll.sin(), x.cross(y) * roll.cos() - y * roll.sin());
         let turn = DMat3::from_cols(x, y, z);
-        let opening = 0.28 + 0.22 * swing(self.period.y * 0.8, 1.0);
 
         let mut mesh = TriMesh::default();
         let hinge = -JAW_LENGTH;
-        let reach = (tip - port).length() / self.scale + 0.01;
+        let reach = (tip - port).length() / scale + 0.01;
         let round = |x: f64, r: f64| (DVec3::new(x, 0.0, 0.0), r, r);
         let dark = [58, 58, 64];
         let steel = [172, 176, 184];
@@ -105,7 +124,7 @@ impl Instrument {
             loft(&mut mesh, &rings, steel);
         }
         for v in &mut mesh.vertices {
-            *v = tip + turn * (*v * self.scale);
+            *v = tip + turn * (*v * scale);
         }
         mesh
     }

@@ -3,7 +3,8 @@
 //!
 //! A phantom replaces a recording of real organs in tests and demonstrations. [`record`] writes a
 //! recording folder with colour, depth and masks. Its subfolder `truth/` contains the exact
-//! picture, depth and organ surfaces.
+//! picture, depth and organ surfaces. On request, it goes on with filmed grasp-lifts of the
+//! appendix, whose truth is in `truth/lifts.toml`.
 //!
 //! ```
 //! use trocar_phantom::{NAMES, RecordOptions, describe};
@@ -23,6 +24,7 @@ mod error;
 mod folder;
 mod frame;
 mod instruments;
+mod lifts;
 mod noise;
 mod pack;
 mod paint;
@@ -43,5 +45,6 @@ mod tests;
 pub use catalog::NAMES;
 pub use error::{Error, Result};
 pub use folder::phantoms_folder;
-pub use record::{RecordOptions, describe, record};
+pub use lifts::{HiddenSupport, LIFTS_FILE, LiftTruth, LiftsTruth, Threads};
+pub use record::{LiftOptions, RecordOptions, describe, record};
 pub use sensor::Sensor;

@@ -8,6 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use trocar_core::interpolate::smoothstep;
 use trocar_geometry::{SignedDistance, TriMesh};
+use trocar_render::phong::Shading;
 
 const VEIN: DVec3 = DVec3::new(112.0, 28.0, 40.0);
 const FAT: DVec3 = DVec3::new(226.0, 176.0, 104.0);
@@ -26,8 +27,13 @@ fn bytes(color: DVec3) -> [u8; 3] {
     color.to_array().map(|c| c.round().clamp(0.0, 255.0) as u8)
 }
 
+/// Shading of an organ.
+pub(crate) fn shading(look: TissueAppearance) -> Shading {
+    Shading { color: [200, 120, 110], gloss: gloss(look), wireframe: false }
+}
+
 /// Strength of the highlights on an organ.
-pub(crate) fn gloss(look: TissueAppearance) -> f32 {
+fn gloss(look: TissueAppearance) -> f32 {
     match look {
         TissueAppearance::Bowel { .. } => 0.4,
         TissueAppearance::Liver => 0.5,

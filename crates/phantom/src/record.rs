@@ -2,6 +2,7 @@
 
 use crate::anatomy::Anatomy;
 use crate::frame::{FrameSettings, RATE_HZ, record_frame};
+use crate::lifts::{self, HiddenSupport, Lifts};
 use crate::sensor::Sensor;
 use crate::spec::{Organ, PhantomSpec, Resolution};
 use crate::static_view::StaticView;
@@ -11,7 +12,7 @@ use std::path::Path;
 use trocar_camera::Camera;
 use trocar_core::Progress;
 use trocar_geometry::io::write_ply;
-use trocar_recording::{OrganInfo, RecordingInfo, RecordingWriter};
+use trocar_recording::{LiftInfo, OrganInfo, RecordingInfo, RecordingWriter};
 
 /// File names have six digits.
 const MAX_FRAMES: usize = 1_000_000;
@@ -28,12 +29,32 @@ pub struct RecordOptions {
     pub seed: u64,
     /// Model of the depth noise.
     pub sensor: Sensor,
+    /// Grasp-lifts after these frames.
+    pub lifts: LiftOptions,
+}
+
+/// Grasp-lifts of the appendix.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LiftOptions {
+    /// Number of lifts, of 80 frames each.
+    pub count: usize,
+    /// What holds the organ besides its bed.
+    pub support: HiddenSupport,
+    /// Cell of the mesh of the lifted tissue (m).
+    pub cell: f64,
 }
 
 impl Default for RecordOptions {
-    /// The paper's 60 s, seed 1, plain noise.
+    /// The paper's 60 s, seed 1, plain noise, no lifts.
     fn default() -> Self {
-        Self { frames: 1800, seed: 1, sensor: Sensor::Plain }
+        Self { frames: 1800, seed: 1, sensor: Sensor::Plain, lifts: LiftOptions::default() }
+    }
+}
+
+impl Default for LiftOptions {
+    /// No lifts. Cells of 1.1 mm, half of the finest that reconstruction makes by default.
+    fn default() -> Self {
+        Self { count: 0, support: HiddenSupport::default(), cell: 1.1e-3 }
     }
 }
 
@@ -41,13 +62,17 @@ impl Default for RecordOptions {
 /// ground truth in `truth/`: the picture without instruments and noise, and the organs' surfaces in
 /// the camera frame (m).
 ///
+/// With `options.lifts`, the recording continues with grasp-lifts of the appendix. Their truth is in
+/// `truth/lifts.toml`, see [`LiftsTruth`](crate::LiftsTruth).
+///
 /// The masks of the organs are ground truth too: the pixels that show the organ in the picture
 /// without instruments. Within the mask of an organ, `truth/depth.png` is the depth of that organ's
 /// surface in 0.1 mm. Where organs overlap, the pixel belongs to the mask of the front one.
 ///
 /// # Errors
-/// The name is unknown, the number of frames is out of range, the folder cannot be written, or the
-/// user interrupts. The folder is removed in these cases.
+/// The name is unknown, the number of frames or lifts is out of range, the phantom has no appendix
+/// to lift, the folder cannot be written, or the user interrupts. The folder is removed in these
+/// cases.
 pub fn record(name: &str, options: &RecordOptions, dir: &Path, progress: &dyn Progress) -> Result<()> {
     let spec = catalog::named(name)?;
     record_with(spec, options, &Camera::d405(), spec.resolution, dir, progress)
@@ -62,7 +87,7 @@ pub(crate) fn record_with(
     dir: &Path,
     progress: &dyn Progress,
 ) -> Result<()> {
-    let RecordOptions { frames, seed, sensor } = *options;
+    let RecordOptions { frames, seed, sensor, lifts } = *options;
     if frames == 0 || frames > MAX_FRAMES {
         return Err(Error::Option(format!("frames is {frames}; must be in [1, {MAX_FRAMES}]")));
     }
@@ -72,14 +97,16 @@ pub(crate) fn record_with(
             dir.display()
         )));
     }
+    lifts::check(spec, &lifts)?;
     progress.begin("anatomy", 1);
     if progress.interrupted() {
         return Err(Error::Interrupted);
     }
     let anatomy = Anatomy::new(spec, seed);
-    let info = info(spec, options, camera, &anatomy);
-    let writer = RecordingWriter::create(dir, &info)?;
     let still = StaticView::new(spec, &anatomy, camera, resolution);
+    let lifts = Lifts::plan(spec, &lifts, &anatomy, &still.surfaces, (camera, seed, frames))?;
+    let marked = lifts.as_ref().map(Lifts::info).unwrap_or_default();
+    let writer = RecordingWriter::create(dir, &info(spec, options, camera, &anatomy, marked))?;
     for (index, organ) in anatomy.organs.iter().enumerate() {
         writer.organ_mask(organ.name, &still.organ_mask(index))?;
     }
@@ -100,22 +127,36 @@ pub(crate) fn record_with(
         Ok(())
     })?;
     progress.end();
+    if let Some(lifts) = lifts {
+        lifts.film(&anatomy, resolution, take, &writer, progress)?;
+    }
     Ok(writer.finish()?)
 }
 
-/// The contents of `recording.toml` that [`record`] writes for these options.
+/// The contents of `recording.toml` that [`record`] writes for these options, without the lifts.
 ///
 /// # Errors
 /// The name is unknown.
 pub fn describe(name: &str, options: &RecordOptions) -> Result<RecordingInfo> {
     let spec = catalog::named(name)?;
-    Ok(info(spec, options, &Camera::d405(), &Anatomy::new(spec, options.seed)))
+    Ok(info(spec, options, &Camera::d405(), &Anatomy::new(spec, options.seed), Vec::new()))
 }
 
 /// Contents of `recording.toml`.
-fn info(spec: &PhantomSpec, options: &RecordOptions, camera: &Camera, anatomy: &Anatomy) -> RecordingInfo {
+fn info(
+    spec: &PhantomSpec,
+    options: &RecordOptions,
+    camera: &Camera,
+    anatomy: &Anatomy,
+    lifts: Vec<LiftInfo>,
+) -> RecordingInfo {
     let seed = options.seed;
     let noise = if options.sensor == Sensor::Stereo { ", stereo noise" } else { "" };
+    let LiftOptions { count, support, cell } = options.lifts;
+    let lifted = match count {
+        0 => String::new(),
+        _ => format!(", {count} lifts of tissue with cells of {} mm and support '{}'", 1e3 * cell, support.name()),
+    };
     let pixel = |p| camera.project(p).map(|q| [(q.x * 10.0).round() / 10.0, (q.y * 10.0).round() / 10.0]);
     let organ = |o: &Organ| OrganInfo {
         name: o.name.to_owned(),
@@ -129,9 +170,10 @@ fn info(spec: &PhantomSpec, options: &RecordOptions, camera: &Camera, anatomy: &
         rate_hz: Some(RATE_HZ),
         depth_scale_m: Some(sensor::DEPTH_SCALE),
         up: [0.0, 0.0, -1.0],
-        note: format!("synthetic, seed {seed}{noise}; the truth is in truth/; materials are the paper's"),
+        note: format!("synthetic, seed {seed}{noise}{lifted}; the truth is in truth/; materials are the paper's"),
         camera: Some(*camera),
         organs: anatomy.organs.iter().map(organ).collect(),
+        lifts,
         ..RecordingInfo::default()
     }
 }

@@ -20,19 +20,35 @@ pub(crate) struct StaticView {
 
 impl StaticView {
     pub fn new(spec: &PhantomSpec, anatomy: &Anatomy, camera: &Camera, resolution: Resolution) -> Self {
+        Self::without(None, spec, anatomy, camera, resolution)
+    }
+
+    /// The view without the organ of this index, which moves in front of it.
+    pub fn without(
+        hidden: Option<usize>,
+        spec: &PhantomSpec,
+        anatomy: &Anatomy,
+        camera: &Camera,
+        resolution: Resolution,
+    ) -> Self {
         let mut surfaces = Vec::new();
         let mut instances = Vec::new();
-        for organ in &anatomy.organs {
+        for (index, organ) in anatomy.organs.iter().enumerate() {
             let mut mesh = isosurface(&sample_distance(&organ.body, organ.body.bounds(), resolution.surface), 0.0);
             paint::organ(organ, &mut mesh);
-            let shading = Shading { color: [200, 120, 110], gloss: paint::gloss(organ.look), wireframe: false };
-            instances.push(Instance { mesh: mesh.clone(), label: instances.len() as u16 + 1, shading });
+            if hidden != Some(index) {
+                instances.push(Instance {
+                    mesh: mesh.clone(),
+                    label: index as u16 + 1,
+                    shading: paint::shading(organ.look),
+                });
+            }
             surfaces.push(mesh);
         }
         let mut bed = anatomy.bed.mesh(resolution.bed);
         paint::bed(&anatomy.bed, &mut bed);
         let shading = Shading { color: [180, 90, 80], gloss: 0.12, wireframe: false };
-        instances.push(Instance { mesh: bed, label: instances.len() as u16 + 1, shading });
+        instances.push(Instance { mesh: bed, label: anatomy.organs.len() as u16 + 1, shading });
 
         let scene = PhongScene::new(instances, None, [0; 3]).with_ambient_occlusion(20, spec.occlusion_reach);
         let mut frame = scene.render(camera, &Pose::IDENTITY, 2);

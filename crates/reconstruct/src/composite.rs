@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 use trocar_camera::{ColorImage, DepthImage, Mask};
 use trocar_core::Progress;
-use trocar_recording::{Packet, Recording, RgbdFrame};
+use trocar_recording::{LiftInfo, Packet, Recording, RgbdFrame};
 use xxhash_rust::xxh3::Xxh3;
 
 /// The scene behind the instruments, from a window of frames.
@@ -92,7 +92,7 @@ pub fn composite(
     progress: &dyn Progress,
 ) -> Result<Composite> {
     let scale = recording.depth_scale();
-    let centre = settings.centre.unwrap_or(recording.len() / 2);
+    let centre = settings.centre.unwrap_or_else(|| still_middle(&recording.info.lifts, recording.len()));
     let mut times = CompositeTimes::default();
     let window = window(recording, settings, centre)?;
     let samples = read_window(recording, &window, settings, &mut times, notes, progress)?;
@@ -240,7 +240,26 @@ fn window(recording: &Recording, settings: &Settings, centre: usize) -> Result<V
     }
     let first = centre - settings.window.min(centre) / settings.stride * settings.stride;
     let last = centre.saturating_add(settings.window).min(recording.len() - 1);
-    Ok((first..=last).step_by(settings.stride).collect())
+    let all: Vec<usize> = (first..=last).step_by(settings.stride).collect();
+    // Tissue that is lifted does not lie still. A centre within a lift is the user's own choice.
+    let lifts = &recording.info.lifts;
+    let still: Vec<usize> = all.iter().copied().filter(|f| !lifts.iter().any(|lift| lift.holds(*f))).collect();
+    Ok(if still.contains(&centre) { still } else { all })
+}
+
+/// The middle of the longest run of `frames` frames outside of all lifts; of all frames if there is
+/// none.
+fn still_middle(lifts: &[LiftInfo], frames: usize) -> usize {
+    let (mut best, mut start) = (0..0, 0);
+    for frame in 0..=frames {
+        if frame == frames || lifts.iter().any(|lift| lift.holds(frame)) {
+            if frame - start > best.len() {
+                best = start..frame;
+            }
+            start = frame + 1;
+        }
+    }
+    if best.is_empty() { frames / 2 } else { best.start + best.len() / 2 }
 }
 
 /// Medians over V(u,v): colour over the frames in which no instrument covers the pixel, depth over
@@ -300,5 +319,14 @@ mod tests {
         assert!((range - 3.2).abs() < 1e-12);
         assert!(medians(&samples, 0, 4, 1e-3, &mut Scratch::default()).depth.is_none());
         assert!(medians(&samples, 0, 4, 1e-3, &mut Scratch::default()).color.is_some());
+    }
+
+    #[test]
+    fn the_window_is_centred_where_no_tissue_is_lifted() {
+        let lift = |rest, last| LiftInfo { rest, first: rest + 1, last, click: [0.0; 2] };
+        assert_eq!(still_middle(&[], 100), 50);
+        assert_eq!(still_middle(&[lift(60, 79), lift(80, 99)], 100), 30);
+        assert_eq!(still_middle(&[lift(0, 9), lift(20, 29)], 100), 65);
+        assert_eq!(still_middle(&[lift(0, 99)], 100), 50);
     }
 }

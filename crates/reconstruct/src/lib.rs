@@ -29,6 +29,7 @@ pub use check::{DepthCheck, check as depth_error};
 pub use composite::{Composite, CompositeTimes};
 pub use error::{Error, Result};
 pub use from_surface::from_surface;
+pub use masks::drawn_mask;
 pub use pipeline::{OrganView, Reconstruction, reconstruct};
 pub use settings::{BackRule, MesherRule, Settings, SurfaceRule};
 pub use thickness::modelled_volume;

@@ -81,6 +81,21 @@ impl OrganSegmenters {
     }
 }
 
+/// The mask of an organ that is drawn: its outline, or its file in the folder `masks`. `None` if it
+/// has only points for SAM 2.1.
+///
+/// # Errors
+/// Names the organ whose mask is missing, broken, of the wrong size or empty.
+pub fn drawn_mask(recording: &Recording, organ: &OrganInfo) -> Result<Option<Mask>> {
+    let folder = recording.dir().join("masks");
+    if only_points(organ, &folder) {
+        return Ok(None);
+    }
+    let camera = recording.camera();
+    let blank = ColorImage::new(camera.width, camera.height, [0; 3]);
+    OrganSegmenters { files: MaskFolder { folder }, polygon: Polygon, sam: None }.mask(organ, &blank).map(Some)
+}
+
 /// Pixels of a frame that instruments cover, by the recording's rule; `None` for the recording's
 /// own masks.
 pub fn instruments(rule: InstrumentRule, frame: &RgbdFrame, name: &str) -> Result<Option<Mask>> {

@@ -1,6 +1,7 @@
 //! The contents of `recording.toml`.
 
 use crate::error::{Error, Result};
+use crate::lift::LiftInfo;
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use std::path::{Component, Path};
@@ -58,6 +59,9 @@ pub struct RecordingInfo {
     /// The organs to reconstruct.
     #[serde(default, rename = "organ", skip_serializing_if = "Vec::is_empty")]
     pub organs: Vec<OrganInfo>,
+    /// The intervals in which an instrument lifts tissue.
+    #[serde(default, rename = "lift", skip_serializing_if = "Vec::is_empty")]
+    pub lifts: Vec<LiftInfo>,
 }
 
 /// An instrument, marked by points in one frame.
@@ -236,6 +240,9 @@ impl RecordingInfo {
             if instrument.points.is_empty() || points().any(|c| !c.is_finite()) {
                 return wrong(format!("instrument[{i}].points needs at least one pixel [u, v] on the instrument"));
             }
+        }
+        for (i, lift) in self.lifts.iter().enumerate() {
+            lift.validate(self.camera.as_ref()).or_else(|reason| wrong(format!("lift[{i}].{reason}")))?;
         }
         for (i, organ) in self.organs.iter().enumerate() {
             if let Err(reason) = trocar_specimen::check_name(&organ.name) {

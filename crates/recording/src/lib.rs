@@ -20,6 +20,7 @@ mod error;
 mod folder;
 mod frame_list;
 mod info;
+mod lift;
 mod log;
 pub mod messages;
 mod pairing;
@@ -31,6 +32,7 @@ mod writer;
 
 pub use error::{Error, Result};
 pub use info::{DepthToColor, InstrumentInfo, InstrumentRule, OrganInfo, RecordingInfo, SourceInfo};
+pub use lift::LiftInfo;
 pub use pairing::Pairing;
 pub use recording::{Recording, RgbdFrame};
 pub use register::Registration;

@@ -109,8 +109,19 @@ impl Recording {
         let [du, dv] = recording.offset();
         recording.camera.cx += du as f64;
         recording.camera.cy += dv as f64;
+        recording.check_lifts()?;
         recording.probe()?;
         Ok(recording)
+    }
+
+    /// Checks that the lifts have frames and pixels of this recording.
+    fn check_lifts(&self) -> Result<()> {
+        for (i, lift) in self.info.lifts.iter().enumerate() {
+            let wrong = |reason: String| Error::wrong(&self.toml, format!("lift[{i}].{reason}"));
+            lift.validate_frames(self.len()).map_err(wrong)?;
+            lift.validate_click(&self.camera).map_err(wrong)?;
+        }
+        Ok(())
     }
 
     /// Decodes the first good frame. A defect of all first frames is a defect of the recording.

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use trocar_camera::{ColorImage, DepthImage, Mask};
-use trocar_recording::{Recording, RecordingWriter};
+use trocar_recording::{LiftInfo, Recording, RecordingWriter};
 use trocar_testing::sphere::{self, info, write};
 
 /// A new recording of three frames for a test to damage.
@@ -285,4 +285,30 @@ fn an_unfinished_recording_leaves_nothing() {
     let mut bad = info();
     bad.depth_scale_m = Some(0.0);
     assert!(RecordingWriter::create(&dir, &bad).err().unwrap().to_string().contains("depth_scale_m"));
+}
+
+#[test]
+fn damaged_lifts_name_file_and_field() {
+    let root = tempfile::tempdir().unwrap();
+    let dir = root.path().join("recording");
+    let mut info = info();
+    info.lifts = vec![LiftInfo { rest: 0, first: 1, last: 2, click: [80.0, 60.0] }];
+    write(&dir, &info, 3);
+    assert_eq!(Recording::open(&dir).unwrap().info.lifts, info.lifts);
+    let toml = dir.join("recording.toml");
+    let good = fs::read_to_string(&toml).unwrap();
+    for (from, to, expected) in [
+        ("last = 2", "last = 3", "lift[0].last is 3; the recording has the frames 0 to 2"),
+        ("last = 2", "last = 1", "lift[0].last is 1; it must be after first"),
+        ("rest = 0", "rest = 2", "lift[0].first is 1; it must not be before rest"),
+        ("rest = 0", "rest = -1", "rest"),
+        ("click = [80.0, 60.0]", "click = [80.0, 600.0]", "lift[0].click is [80, 600]"),
+        ("click = [80.0, 60.0]", "click = [80.0]", "click"),
+        ("click = [80.0, 60.0]", "klick = [80.0, 60.0]", "klick"),
+    ] {
+        fs::write(&toml, &good).unwrap();
+        replace(&toml, from, to);
+        let error = failure(&dir);
+        assert!(error.contains("recording.toml") && error.contains(expected), "{error}");
+    }
 }

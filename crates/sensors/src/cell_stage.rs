@@ -21,6 +21,11 @@ const INSTRUMENTS: u16 = 101;
 const ARMS: u16 = 111;
 const OTHERS: u16 = 201;
 
+/// Whether a label of a picture is that of an instrument or an arm.
+pub fn is_tool(label: u16) -> bool {
+    (INSTRUMENTS..OTHERS).contains(&label)
+}
+
 /// Everything that cameras of a cell can see. A copy shares what does not move.
 #[derive(Clone)]
 pub(crate) struct CellStage {

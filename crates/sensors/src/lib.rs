@@ -24,6 +24,7 @@ mod surroundings;
 mod visuals;
 
 pub use camera::{OUTSIDE, image_circle};
+pub use cell_stage::is_tool;
 pub use drawn::{DrawnBody, DrawnCell, DrawnMesh, DrawnPart};
 pub use error::{Error, Result};
 pub use organ::BoundSurface;

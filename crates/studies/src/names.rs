@@ -175,6 +175,18 @@ choice! {
     }
 }
 
+choice! {
+    /// What holds the lifted organ besides its bed.
+    SupportName: trocar_phantom::HiddenSupport {
+        /// Its base alone.
+        Base => Base,
+        /// Its base, and a slack sheet along the half beyond the middle.
+        Mesentery => Mesentery,
+        /// Its base, and a short adhesion at the tip.
+        Adhesion => Adhesion,
+    }
+}
+
 /// The source of the appendix.
 #[derive(Clone, Debug, Args)]
 pub struct AppendixChoice {

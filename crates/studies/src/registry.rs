@@ -5,7 +5,7 @@ use crate::bench::{
 };
 use crate::experiment::{
     BackendsExperiment, BeamExperiment, ContactExperiment, ControllerGridExperiment, ConvergenceExperiment,
-    CutForceExperiment, ElementQualityExperiment, GraspDesignsExperiment, IntegratorsExperiment,
+    CutForceExperiment, ElementQualityExperiment, GraspDesignsExperiment, IntegratorsExperiment, LiftsExperiment,
     MeshConvergenceExperiment, PortBudgetExperiment, PortRegraspExperiment, RandomActionsExperiment,
     ReconstructionExperiment, RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment,
     TruthCubeExperiment, WrenchExperiment,
@@ -34,6 +34,7 @@ pub static STUDIES: &[&dyn Entry] = &[
     &Of::<RobustnessExperiment>::NEW,
     &Of::<BackendsExperiment>::NEW,
     &Of::<SimilarityExperiment>::NEW,
+    &Of::<LiftsExperiment>::NEW,
     &Of::<MeshingBench>::NEW,
     &Of::<OrgansBench>::NEW,
     &Of::<ScalingBench>::NEW,

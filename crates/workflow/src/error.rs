@@ -61,6 +61,9 @@ pub enum Error {
         /// Number of episodes of the whole campaign.
         planned: usize,
     },
+    /// A lift cannot be measured.
+    #[error(transparent)]
+    Measure(trocar_measure::Error),
     /// A step of a study failed.
     #[error(transparent)]
     Study(Box<dyn std::error::Error + Send + Sync>),
@@ -135,6 +138,15 @@ impl From<trocar_phantom::Error> for Error {
 }
 
 /// Keeps interruptions apart from other errors.
+impl From<trocar_measure::Error> for Error {
+    fn from(error: trocar_measure::Error) -> Self {
+        match error {
+            trocar_measure::Error::Interrupted => Self::Interrupted,
+            other => Self::Measure(other),
+        }
+    }
+}
+
 impl From<trocar_reconstruct::Error> for Error {
     fn from(error: trocar_reconstruct::Error) -> Self {
         match error {

@@ -9,6 +9,7 @@ mod gltf;
 mod inspect;
 mod lift;
 mod lift_result;
+pub mod measure;
 pub mod pages;
 pub mod paper;
 pub mod phantoms;

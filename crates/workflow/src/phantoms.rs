@@ -22,11 +22,13 @@ const FRAMES: usize = 181;
 /// A phantom that is not known, a folder that cannot be written.
 pub fn recorded(phantom: &str, options: &RecordOptions, dir: &Path, progress: &dyn Progress) -> Result<()> {
     let described = trocar_phantom::describe(phantom, options)?;
-    if let Ok(earlier) = Recording::open(dir)
-        && earlier.info == described
-        && earlier.len() == options.frames
-    {
-        return Ok(());
+    if let Ok(earlier) = Recording::open(dir) {
+        let mut info = earlier.info.clone();
+        let lifts = std::mem::take(&mut info.lifts);
+        let frames = lifts.last().map_or(options.frames, |lift| lift.last + 1);
+        if info == described && lifts.len() == options.lifts.count && earlier.len() == frames {
+            return Ok(());
+        }
     }
     Ok(trocar_phantom::record(phantom, options, dir, progress)?)
 }

@@ -5,6 +5,7 @@ mod episode;
 mod evaluate;
 mod export;
 mod inspect;
+mod measure;
 mod reconstruct;
 mod record;
 mod render;
@@ -32,6 +33,7 @@ pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
         Command::Export(arguments) => export::run(arguments, cli.json, cli.quiet, progress)?,
         Command::Sweep(arguments) => episode::sweep(arguments, cli.json, progress)?,
         Command::Inspect(arguments) => inspect::run(arguments, cli.json)?,
+        Command::Measure(arguments) => measure::run(arguments, cli.json, progress)?,
         Command::Record(arguments) => record::run(arguments, cli.json, progress)?,
         Command::Render(arguments) => render::run(arguments, cli.json, progress)?,
         Command::Reconstruct(arguments) => reconstruct::run(arguments, cli.json, progress)?,

@@ -46,8 +46,14 @@ impl Integrator for NewtonIntegrator {
             let elastic = &self.elastic;
             let mut step = Motion::new(elastic, &nodes, frame.gravity(), h);
             frame.loads().for_each(|(node, force)| step.push(elastic, node, force));
-            let mut potential =
-                Potential { elastic, motion: Some(step), gravity: frame.gravity(), limits: Vec::new(), contacts: None };
+            let mut potential = Potential {
+                elastic,
+                motion: Some(step),
+                gravity: frame.gravity(),
+                limits: Vec::new(),
+                contacts: None,
+                tethers: &[],
+            };
             let mut x = nodes.x.clone();
             match rounds::minimise(&mut self.solver, &mut potential, &fixed, &targets, &nodes.v, &mut x) {
                 Ok(solution) => outcome.iterations += solution.iterations,

@@ -14,6 +14,7 @@
 //! - the supports' one-sided quadratic penalty;
 //! - contact with tools and between bodies at the present distances and normals, where the fast
 //!   solvers hold a plane during a substep;
+//! - threads from nodes to fixed points, if there are any;
 //! - pinned nodes stay; held nodes are prescribed. The stepper's rules for nodes that cannot follow
 //!   a tool are left out: a motion that cannot be followed is an error.
 //!
@@ -40,11 +41,13 @@ mod solution;
 mod state;
 #[cfg(test)]
 mod tests;
+mod tether;
 
 pub use integrator::{Newton, NewtonIntegrator};
 pub use potential::elastic_energy;
 pub use solution::{Failure, Precision, Solution};
 pub use state::{Held, OracleState};
+pub use tether::Tether;
 
 use crate::{Error, Result};
 use contact::{Contacts, Touching};
@@ -88,6 +91,8 @@ struct Group {
     elastic: Elastic,
     solver: Solver,
     touching: Touching,
+    /// Nodes are counted among those of the group.
+    tethers: Vec<Tether>,
 }
 
 /// The outcome of a group's solve, before anything is written.
@@ -116,9 +121,36 @@ impl Oracle {
             let elastic = Elastic::of(&model.bodies()[bodies.clone()]);
             let solver = Solver::of(&elastic, precision);
             let lengths = model.bodies()[bodies.clone()].iter().map(Body::len).collect();
-            Group { touching: Touching::new(model, bodies.clone()), bodies, lengths, elastic, solver }
+            let touching = Touching::new(model, bodies.clone());
+            Group { touching, bodies, lengths, elastic, solver, tethers: Vec::new() }
         };
         Self { groups: groups.into_iter().map(prepare).collect(), forces: Vec::new(), pushes: Vec::new() }
+    }
+
+    /// Ties nodes to fixed points.
+    ///
+    /// # Errors
+    /// A node that does not exist, a length or stiffness below 0, a number that is not finite.
+    pub fn with_tethers(mut self, tethers: &[Tether]) -> Result<Self> {
+        for tether in tethers {
+            let Tether { body, node, anchor, length, stiffness } = *tether;
+            let fine = anchor.is_finite() && length.is_finite() && length >= 0.0;
+            if !(fine && stiffness.is_finite() && stiffness >= 0.0) {
+                return Err(Error::Invalid(format!(
+                    "{tether:?}: its numbers must be finite, length and stiffness 0 or more"
+                )));
+            }
+            let group = self.groups.iter_mut().find(|group| group.bodies.contains(&body));
+            let length = group.as_ref().and_then(|g| g.lengths.get(body - g.bodies.start).copied());
+            match (group, length) {
+                (Some(group), Some(nodes)) if (node as usize) < nodes => {
+                    let first: usize = group.lengths[..body - group.bodies.start].iter().sum();
+                    group.tethers.push(Tether { node: node + first as u32, ..*tether });
+                }
+                _ => return Err(Error::Invalid(format!("{tether:?}: the model has no such node"))),
+            }
+        }
+        Ok(self)
     }
 
     /// Advances `state` by one step of implicit Euler of length `dt` (s), the counterpart of one
@@ -207,7 +239,14 @@ impl Oracle {
             let before = Nodes::joined(&before.bodies[group.bodies.clone()]);
             let after = Nodes::joined(&after.bodies[group.bodies.clone()]);
             let motion = Some(Motion::new(elastic, &before, model.gravity(), dt));
-            let potential = Potential { elastic, motion, gravity: model.gravity(), limits: Vec::new(), contacts: None };
+            let potential = Potential {
+                elastic,
+                motion,
+                gravity: model.gravity(),
+                limits: Vec::new(),
+                contacts: None,
+                tethers: &group.tethers,
+            };
             potential.gradient(&after.x, &mut vec![DVec3::ZERO; after.x.len()])
         };
         Ok(self.groups.iter().map(of_group).collect())
@@ -291,15 +330,17 @@ impl Group {
         let names: Vec<&str> = bodies.iter().map(Body::name).collect();
         let named = |failure| Error::Unsolved { body: names.join("', '"), failure };
         let lies = bodies.iter().any(|body| !body.supports().is_empty());
-        if dt.is_none() && model.gravity() != DVec3::ZERO && !lies && !fixed.contains(&true) {
+        let tied = !self.tethers.is_empty();
+        if dt.is_none() && model.gravity() != DVec3::ZERO && !lies && !tied && !fixed.contains(&true) {
             return Err(named(Failure::Unheld));
         }
-        let Self { elastic, solver, touching, .. } = self;
+        let Self { elastic, solver, touching, tethers, .. } = self;
         let motion = dt.map(|dt| Motion::new(elastic, &before, model.gravity(), dt));
         let start = dt.map(|_| (&before.x[..], &state.stretches));
         let touches = model.body_contact().is_some() || (!model.colliders().is_empty() && !tools.is_empty());
         let contacts = touches.then(|| Contacts::new(touching, &elastic.contact_stiffness, &fixed, tools, start));
-        let mut potential = Potential { elastic, motion, gravity: model.gravity(), limits: Vec::new(), contacts };
+        let mut potential =
+            Potential { elastic, motion, gravity: model.gravity(), limits: Vec::new(), contacts, tethers };
         let mut x = before.x.clone();
         let solution = rounds::minimise(solver, &mut potential, &fixed, &targets, &before.v, &mut x).map_err(named)?;
         let mut forces = vec![ToolForce::default(); tools.len()];

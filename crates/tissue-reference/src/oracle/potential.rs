@@ -5,6 +5,7 @@ use super::contact::Contacts;
 use super::element::{deformation, projected};
 use super::rub::{self, outer};
 use super::state::Nodes;
+use super::tether::Tether;
 use glam::{DMat3, DVec3};
 use std::ops::Range;
 use trocar_tissue::assembly::{Stiffness, blocks, shape_gradients, tangent};
@@ -147,6 +148,8 @@ pub(super) struct Potential<'a> {
     pub limits: Vec<f64>,
     /// Contacts with tools and between bodies; None: they pass through each other.
     pub contacts: Option<Contacts<'a>>,
+    /// Threads to fixed points; their nodes are counted among all nodes.
+    pub tethers: &'a [Tether],
 }
 
 impl Potential<'_> {
@@ -195,6 +198,11 @@ impl Potential<'_> {
             energy += contact.energy;
             out[i] += contact.gradient;
         });
+        for tether in self.tethers {
+            let (stored, pull) = tether.energy(x[tether.node as usize]);
+            energy += stored;
+            out[tether.node as usize] += pull;
+        }
         if let Some(contacts) = &self.contacts {
             energy += contacts.gradient(x, |i, gradient| out[i] += gradient);
         }
@@ -243,6 +251,10 @@ impl Potential<'_> {
             let curvature = if secant || project { DMat3::ZERO } else { contact.curvature };
             into.add(i, i, curvature + if secant { contact.secant } else { contact.hessian });
         });
+        for tether in self.tethers {
+            let i = tether.node as usize;
+            into.add(i, i, tether.hessian(x[i]));
+        }
         if let Some(contacts) = &self.contacts {
             contacts.hessian(x, project, secant, into);
         }

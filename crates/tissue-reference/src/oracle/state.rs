@@ -112,6 +112,15 @@ impl OracleState {
         Ok(state)
     }
 
+    /// The same with a body's nodes at `x` (m), such as a guess from which
+    /// [`Oracle::settle`](super::Oracle::settle) begins. A list of another length changes nothing.
+    pub fn with_positions(mut self, body: usize, x: &[DVec3]) -> Self {
+        if let Some(nodes) = self.bodies.get_mut(body).filter(|nodes| nodes.x.len() == x.len()) {
+            nodes.x.copy_from_slice(x);
+        }
+        self
+    }
+
     /// World positions of a body's nodes (m).
     pub fn positions(&self, body: usize) -> &[DVec3] {
         &self.bodies[body].x

@@ -69,7 +69,8 @@ fn deformed<'a>(elastic: &'a Elastic, model: &Model, dynamic: bool) -> (Potentia
         let nodes = Nodes { x: rest.to_vec(), v: noises(n, 3, 0.3), anchors: Vec::new() };
         Motion::new(elastic, &nodes, model.gravity(), 1.0 / 480.0)
     });
-    let mut potential = Potential { elastic, motion, gravity: model.gravity(), limits: Vec::new(), contacts: None };
+    let mut potential =
+        Potential { elastic, motion, gravity: model.gravity(), limits: Vec::new(), contacts: None, tethers: &[] };
     let x: Vec<DVec3> = rest.iter().zip(noises(n, 5, 3e-4)).map(|(p, d)| 1.1 * *p + d).collect();
     if potential.rubs() {
         potential.limits = potential.friction_limits(&x);

@@ -149,6 +149,14 @@ impl RecordedEpisode {
     /// # Errors
     /// A camera that the scene does not have, a size out of range.
     pub fn picture(&mut self, camera: &str, size: [usize; 2], settings: &RenderSettings) -> Result<&Picture> {
+        Ok(self.rig()?.render_still(camera, size, settings)?)
+    }
+
+    /// The cameras, which show the present frame.
+    ///
+    /// # Errors
+    /// Shapes or cameras that cannot be read.
+    pub fn rig(&mut self) -> Result<&mut CameraRig> {
         let rig = match self.rig.take() {
             Some(rig) => rig,
             None => {
@@ -157,7 +165,7 @@ impl RecordedEpisode {
                 rig
             }
         };
-        Ok(self.rig.insert(rig).render_still(camera, size, settings)?)
+        Ok(self.rig.insert(rig))
     }
 }
 

@@ -83,6 +83,7 @@ fn gradient_and_hessian_are_the_energys_derivatives() {
             gravity: model.gravity(),
             limits: Vec::new(),
             contacts: Some(contacts),
+            tethers: &[],
         };
         assert!(potential.hessian(&x, false, false, &mut matrix));
         let mut gradient = x.clone();

@@ -1,0 +1,84 @@
+//! What holds the lifted organ besides its bed. The reconstruction does not see it.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use trocar_geometry::{OrganAxis, TetMesh};
+use trocar_tissue_reference::Tether;
+
+/// Share of the organ's length at its base that does not move.
+const BASE: f64 = 0.08;
+
+/// What holds the lifted organ, by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HiddenSupport {
+    /// The base alone: everything else lies loose on the bed.
+    Base,
+    /// The base, and a slack sheet along the underside of the half beyond the middle.
+    #[default]
+    Mesentery,
+    /// The base, and a short adhesion at the tip.
+    Adhesion,
+}
+
+/// The threads of a [`HiddenSupport`] over a part of the organ.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Threads {
+    /// First organ coordinate that they hold.
+    pub from: f64,
+    /// Last organ coordinate that they hold.
+    pub to: f64,
+    /// Length up to which they are slack (m).
+    pub slack_m: f64,
+    /// Their stiffness per length of the organ (N/m2).
+    pub stiffness_n_m2: f64,
+}
+
+impl HiddenSupport {
+    /// All supports.
+    pub const ALL: [Self; 3] = [Self::Base, Self::Mesentery, Self::Adhesion];
+
+    /// The name in files and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Base => "base",
+            Self::Mesentery => "mesentery",
+            Self::Adhesion => "adhesion",
+        }
+    }
+
+    /// The threads, if there are any.
+    pub fn threads(self) -> Option<Threads> {
+        match self {
+            Self::Base => None,
+            Self::Mesentery => Some(Threads { from: 0.5, to: 1.0, slack_m: 8e-3, stiffness_n_m2: 600.0 }),
+            Self::Adhesion => Some(Threads { from: 0.93, to: 1.0, slack_m: 2e-3, stiffness_n_m2: 6000.0 }),
+        }
+    }
+
+    /// The nodes that never move: those of the base.
+    pub(super) fn pinned(axis: &OrganAxis) -> Vec<u32> {
+        (0..axis.s.len() as u32).filter(|i| axis.s[*i as usize] <= BASE).collect()
+    }
+
+    /// The threads of the lowest nodes along `up` (unit vector). `spacing` (m) is the distance
+    /// between two threads along the organ.
+    pub(super) fn tethers(self, mesh: &TetMesh, axis: &OrganAxis, up: DVec3, spacing: f64) -> Vec<Tether> {
+        let Some(Threads { from, to, slack_m, stiffness_n_m2 }) = self.threads() else { return Vec::new() };
+        let count = ((to - from) * axis.length / spacing).ceil().max(1.0) as usize;
+        let step = (to - from) / count as f64;
+        let lowest = |k: usize| {
+            let (low, high) = (from + k as f64 * step, from + (k + 1) as f64 * step);
+            let nodes = (0..axis.s.len()).filter(|i| axis.s[*i] >= low && axis.s[*i] <= high);
+            nodes.min_by(|a, b| mesh.vertices[*a].dot(up).total_cmp(&mesh.vertices[*b].dot(up)))
+        };
+        let tether = |node: usize| Tether {
+            body: 0,
+            node: node as u32,
+            anchor: mesh.vertices[node],
+            length: slack_m,
+            stiffness: stiffness_n_m2 * step * axis.length,
+        };
+        (0..count).filter_map(lowest).map(tether).collect()
+    }
+}
