@@ -5,6 +5,10 @@
 pub(super) enum Phase {
     Approach,
     Enter,
+    /// Open blades back out of tissue that presses them apart.
+    BackOut,
+    /// Jaws that tissue keeps open open again and back out a little.
+    BackOff,
     Close,
     Drag,
     Release,
@@ -30,7 +34,7 @@ impl Phase {
     pub fn name(self) -> &'static str {
         match self {
             Self::Approach => "approach",
-            Self::Enter => "enter",
+            Self::Enter | Self::BackOut | Self::BackOff => "enter",
             Self::Close => "close",
             Self::Drag => "drag",
             Self::Release => "release",

@@ -54,6 +54,8 @@ pub struct Scripted {
     grasp: Option<Aim>,
     lift: f64,
     tries: usize,
+    /// Times that the jaws backed off from this grasp.
+    backs: usize,
     dragged: bool,
     grip: Grip,
     /// How much farther from where the organ is held than its middle it grasps, in organ
@@ -84,6 +86,7 @@ impl Scripted {
             grasp: None,
             lift: 0.0,
             tries: 0,
+            backs: 0,
             dragged: false,
             grip: Grip::default(),
             outward: 0.0,

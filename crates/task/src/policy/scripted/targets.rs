@@ -23,6 +23,15 @@ const CARRY: f64 = 0.010;
 const CARRY_S: f64 = 1.0;
 const KEEP_S: f64 = 0.5;
 
+/// Way along the shaft by which open blades back out of tissue that presses them apart, at most (m),
+/// and their speed (m/s).
+const BACK_OUT: f64 = 0.008;
+const BACK_OUT_SPEED: f64 = 0.010;
+
+/// Way by which jaws that tissue keeps open back off (m), and its time (s).
+const BACK_OFF: f64 = 0.0015;
+const BACK_OFF_S: f64 = 0.3;
+
 /// Speed of the tips on the way there, and close to tissue (m/s).
 const FAST: f64 = 0.04;
 const SLOW: f64 = 0.025;
@@ -108,12 +117,23 @@ impl Scripted {
                     Some(script) => (Place::At(script.at), script.approach_offset),
                     None => (Place::InRange([gates.grasp_from, gates.grasp_to], self.outward), 0.0),
                 };
+                self.backs = 0;
                 let aim = aim::grasp(cell, arms[k], body, (place, Manner::Fitting), aside)?;
                 self.grasp = Some(aim);
                 let open = aim.setpoint;
                 let behind = || Ok::<_, Error>(cell.workspace(arms[k])?.behind(&open, BACK));
                 self.to[k] = if self.phase == Phase::Approach { behind()? } else { open };
                 self.time(episode, k, if self.phase == Phase::Approach { FAST } else { SLOW })?
+            }
+            Phase::BackOut => {
+                let Some(k) = grasper else { return Ok(()) };
+                self.to[k] = cell.workspace(arms[k])?.behind(&self.from[k], BACK_OUT);
+                self.time(episode, k, BACK_OUT_SPEED)?
+            }
+            Phase::BackOff => {
+                let (Some(k), Some(aim)) = (grasper, &self.grasp) else { return Ok(()) };
+                self.to[k] = cell.workspace(arms[k])?.behind(&self.from[k], BACK_OFF).with_jaw(aim.setpoint.jaw());
+                BACK_OFF_S
             }
             Phase::Close => {
                 if let Some(k) = grasper {

@@ -12,6 +12,10 @@ use trocar_scene::{Condition, TaskName};
 const MAX_SPREAD: f64 = 0.8;
 pub(super) const WATCHED_SPREAD: f64 = 0.2;
 
+/// Jaws that stop above this share of their opening have not closed. They back off so many times.
+const KEPT_OPEN: f64 = 0.85;
+const MAX_BACKS: usize = 4;
+
 /// The jaws lift until the tissue has risen by the gate's lift and this (m).
 const ENOUGH_ABOVE: f64 = 0.0005;
 
@@ -39,9 +43,17 @@ impl Scripted {
         let task = episode.scene().task.name;
         let drags = self.script.is_some_and(|script| script.regrasp.is_some()) && !self.dragged;
         let after = self.script.map(|script| script.after);
+        if matches!(self.phase, Phase::BackOut | Phase::BackOff) {
+            self.stay(episode);
+        }
         let next = match self.phase {
             Phase::Approach => Phase::Enter,
-            Phase::Enter => Phase::Close,
+            Phase::Enter if self.spread(episode) >= MAX_SPREAD => Phase::BackOut,
+            Phase::Enter | Phase::BackOut | Phase::BackOff => Phase::Close,
+            Phase::Close if self.is_kept_open(episode) => {
+                self.backs += 1;
+                Phase::BackOff
+            }
             Phase::Close if t.grasped == 0.0 && again => {
                 self.tries += 1;
                 self.grip.missed(self.has_pierced(episode));
@@ -94,17 +106,21 @@ impl Scripted {
         self.start_phase(next);
     }
 
-    /// Whether the phase is over before its time: the jaws hold tissue, or open blades are as deep
-    /// in it as the jaws can close on.
+    /// Whether the phase is over before its time: the jaws hold tissue, open blades are as deep in
+    /// it as the jaws can close on, or have backed out so far.
     pub(super) fn early(&self, episode: &Episode) -> bool {
-        let holds = self.feels() && seen(episode).task.grasped > 0.0;
-        self.done > 0 && (holds || self.spread(episode) >= MAX_SPREAD)
+        let over = match self.phase {
+            Phase::Approach | Phase::Enter => self.spread(episode) >= MAX_SPREAD,
+            Phase::BackOut => self.spread(episode) < MAX_SPREAD,
+            _ => self.feels() && seen(episode).task.grasped > 0.0,
+        };
+        self.done > 0 && over
     }
 
-    /// While open blades go into tissue: the force with which it presses them apart, over that of
+    /// While open blades go into tissue or back out: the force with which it presses them apart, over that of
     /// the jaws; else 0.
     pub(super) fn spread(&self, episode: &Episode) -> f64 {
-        if self.style != Style::Careful || !self.goes_in() {
+        if self.style != Style::Careful || !(self.goes_in() || self.phase == Phase::BackOut) {
             return 0.0;
         }
         let Some(k) = episode.roles().0 else { return 0.0 };
@@ -124,6 +140,13 @@ impl Scripted {
         if let (Some(aim), Some(last)) = (&mut self.grasp, self.last.get(k)) {
             (aim.pose.translation, aim.setpoint) = (tip.translation, *last);
         }
+    }
+
+    /// Whether the jaws have stopped as good as open: their ends press on what lies below the tissue.
+    fn is_kept_open(&self, episode: &Episode) -> bool {
+        let (Some(k), Some(aim)) = (episode.roles().0, &self.grasp) else { return false };
+        let open = episode.cell().observe()[k].measured.jaw() > KEPT_OPEN * aim.setpoint.jaw();
+        self.style == Style::Careful && open && self.backs < MAX_BACKS
     }
 
     /// Whether the lift continues: the tissue has risen by `least` (mm), and not yet enough.
