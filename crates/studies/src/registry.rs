@@ -1,7 +1,7 @@
 //! The list of all studies.
 
 use crate::bench::{
-    CellBench, EpisodeBench, GraspBench, MeshingBench, OrgansBench, RenderBench, ScalingBench, ViewBench,
+    CellBench, EpisodeBench, GraspBench, ManyBench, MeshingBench, OrgansBench, RenderBench, ScalingBench, ViewBench,
 };
 use crate::experiment::{
     BeamExperiment, ContactExperiment, ControllerGridExperiment, ConvergenceExperiment, CutForceExperiment,
@@ -36,6 +36,7 @@ pub static STUDIES: &[&dyn Entry] = &[
     &Of::<MeshingBench>::NEW,
     &Of::<OrgansBench>::NEW,
     &Of::<ScalingBench>::NEW,
+    &Of::<ManyBench>::NEW,
     &Of::<GraspBench>::NEW,
     &Of::<CellBench>::NEW,
     &Of::<EpisodeBench>::NEW,
