@@ -43,10 +43,10 @@ pub struct ManyBench {
     #[arg(long, default_value_t = 20)]
     pub frames: usize,
     /// Frames after which errors are taken.
-    #[arg(long, default_value_t = 20)]
+    #[arg(long, default_value_t = 15)]
     pub judged_frames: usize,
     /// Instances whose errors are taken, the first ones.
-    #[arg(long, default_value_t = 4)]
+    #[arg(long, default_value_t = 3)]
     pub judged: usize,
     /// Relative tolerance of the batch.
     #[arg(long, default_value_t = BatchSettings::default().relative)]
