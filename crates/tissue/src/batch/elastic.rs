@@ -9,7 +9,7 @@
 
 use super::topology::{Place, Topology};
 use crate::registers::{Block, Reg, load, splat, store, width};
-use fearless_simd::{Simd, SimdBase, SimdMask};
+use fearless_simd::{Select, Simd, SimdBase, SimdMask};
 use glam::DMat3;
 use trocar_lattice::Material;
 
@@ -212,8 +212,17 @@ where
 #[inline(never)]
 fn add_limits<S: Simd>(simd: S, unit: &Material, weight: f32, f: &[Nine<S>; 9], p: &mut [Nine<S>; 9]) {
     for (f, p) in f[..8].iter().zip(&mut p[..8]) {
+        let mut square = splat(simd, 0.0);
+        for e in 0..9 {
+            square += f[e] * f[e];
+        }
+        let acts = areas(f).1.simd_lt(splat(simd, LIMITED_RATIO)) | square.simd_gt(splat(simd, LIMITED_SQUARE));
+        let bits = acts.to_bitmask();
+        if bits == 0 {
+            continue;
+        }
         let mut added = [[0.0f32; 16]; 9];
-        for lane in 0..width::<S>() {
+        for lane in (0..width::<S>()).filter(|lane| bits >> lane & 1 == 1) {
             let numbers: [f64; 9] = std::array::from_fn(|e| f64::from(f[e].as_slice()[lane]));
             if let Some(stress) = unit.limit_stress(DMat3::from_cols_array(&numbers)) {
                 for (added, part) in added.iter_mut().zip(stress.to_cols_array()) {
@@ -221,8 +230,9 @@ fn add_limits<S: Simd>(simd: S, unit: &Material, weight: f32, f: &[Nine<S>; 9], 
                 }
             }
         }
+        // Other lanes keep every bit.
         for e in 0..9 {
-            p[e] += Reg::<S>::from_slice(simd, &added[e][..width::<S>()]);
+            p[e] = acts.select(p[e] + Reg::<S>::from_slice(simd, &added[e][..width::<S>()]), p[e]);
         }
     }
 }

@@ -73,7 +73,8 @@ impl Scene {
         let (mesh, kept) = movable(rest, organ.tets(), organ.pinned());
         let lattice = lattice_of(&mesh, nodes)?;
         let cell = lattice.cell();
-        let held = spread(fine.patches[0].nodes.iter().map(|i| rest[*i as usize]).collect());
+        let patch: Vec<DVec3> = fine.patches[0].nodes.iter().map(|i| rest[*i as usize]).collect();
+        let held = spread(&patch);
         let jaws = held.iter().sum::<DVec3>() / held.len().max(1) as f64;
         let pinned: Vec<u32> = (0..kept.len()).filter(|i| organ.pinned()[kept[*i]]).map(|i| i as u32).collect();
         let (grip, points) = (lattice.embed(&held).map_err(of_lattice)?, lattice.embed_nodes().map_err(of_lattice)?);
@@ -201,7 +202,7 @@ fn movable(nodes: &[DVec3], tets: &[[u32; 4]], pinned: &[bool]) -> (TetMesh, Vec
 }
 
 /// Some points, far from each other, from the highest on (m).
-fn spread(points: Vec<DVec3>) -> Vec<DVec3> {
+fn spread(points: &[DVec3]) -> Vec<DVec3> {
     let mut chosen: Vec<DVec3> = points.iter().copied().max_by(|a, b| a.z.total_cmp(&b.z)).into_iter().collect();
     while chosen.len() < POINTS.min(points.len()) {
         let near = |p: &DVec3| chosen.iter().map(|q| p.distance(*q)).fold(f64::INFINITY, f64::min);
