@@ -1,7 +1,8 @@
 //! The list of all studies.
 
 use crate::bench::{
-    CellBench, EpisodeBench, GraspBench, LiftBench, MeshingBench, OrgansBench, RenderBench, ScalingBench, ViewBench,
+    CellBench, EpisodeBench, GraspBench, LiftBench, ManyBench, MeshingBench, OrgansBench, RenderBench, ScalingBench,
+    ViewBench,
 };
 use crate::experiment::{
     BackendsExperiment, BeamExperiment, ContactExperiment, ControllerGridExperiment, ConvergenceExperiment,
@@ -38,6 +39,7 @@ pub static STUDIES: &[&dyn Entry] = &[
     &Of::<MeshingBench>::NEW,
     &Of::<OrgansBench>::NEW,
     &Of::<ScalingBench>::NEW,
+    &Of::<ManyBench>::NEW,
     &Of::<GraspBench>::NEW,
     &Of::<LiftBench>::NEW,
     &Of::<CellBench>::NEW,

@@ -46,6 +46,7 @@
 
 pub mod assembly;
 mod backend;
+mod batch;
 mod body;
 mod body_slot;
 mod builder;
@@ -79,6 +80,7 @@ mod threads;
 mod untangle;
 
 pub use backend::{Backend, LatticeSettings, Law};
+pub use batch::{Batch, BatchSettings, Instance, InstanceReport};
 pub use body::Body;
 pub use builder::{BodyDescription, MassFloor, ModelBuilder};
 pub use contact::{Event, ToolForce};

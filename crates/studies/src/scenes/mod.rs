@@ -17,5 +17,6 @@ pub use laparoscopic::{LaparoscopicScene, view as endoscope_view};
 pub use organs::{Organ, Organs};
 pub(crate) use run::reference;
 pub use run::{OracleRun, Run, grasps, rest_positions, tools};
+pub(crate) use scene::GRAVITY;
 pub use scene::{BenchScene, FRAME, Motion, Patch, SCENES, material};
 pub use shapes::ellipsoid;

@@ -122,6 +122,16 @@ impl Organs {
         Self::of(vec![Organ { name: APPENDIX.into(), mesh: analytic_appendix(tets)? }], "our own appendix".into())
     }
 
+    /// Only the largest procedural organ, of about `tets` elements.
+    ///
+    /// # Errors
+    /// Too few elements to mesh it.
+    pub fn analytic_largest(tets: usize) -> Result<Self> {
+        let (name, _, half) = ELLIPSOIDS[0];
+        let mesh = mesh(&shapes::ellipsoid(DVec3::from(half), SPACING), tets)?;
+        Self::of(vec![Organ { name: name.into(), mesh }], "our own cecum".into())
+    }
+
     /// Only the appendix.
     pub fn only_appendix(&self) -> Self {
         Self { organs: vec![self.organs[self.appendix].clone()], appendix: 0, source: self.source.clone() }

@@ -7,13 +7,13 @@ use std::f64::consts::TAU;
 use trocar_cell::VISCOSITY_TIME;
 use trocar_core::Pose;
 use trocar_geometry::OrganAxis;
-use trocar_tissue::{BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, pins};
+use trocar_tissue::{Backend, BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, pins};
 
 /// Length of a frame (s).
 pub const FRAME: f64 = 1.0 / 60.0;
 
 /// Standard gravity (m/s²).
-const GRAVITY: f64 = 9.80665;
+pub(crate) const GRAVITY: f64 = 9.80665;
 
 /// Share of pinned nodes of each organ: the lowest ones.
 const PINNED: f64 = 0.42;
@@ -142,7 +142,7 @@ impl BenchScene {
     /// Organs or a material that cannot be simulated.
     pub fn sag(organs: &Organs, material: Material) -> Result<Self> {
         let banded = |o: &Organ| pins::lowest_band(&o.mesh.vertices, DVec3::Z, PINNED);
-        Self::of("sag", &organs.organs, organs.appendix, material, banded)
+        Self::of("sag", &organs.organs, organs.appendix, (material, Backend::Tetrahedra), banded)
     }
 
     /// As [`Self::sag`], with a patch of the appendix that moves up and down by 10 mm at 10 mm/s.
@@ -150,8 +150,17 @@ impl BenchScene {
     /// # Errors
     /// As [`Self::sag`].
     pub fn drag(organs: &Organs, material: Material) -> Result<Self> {
+        Self::drag_on(organs, material, Backend::Tetrahedra)
+    }
+
+    /// As [`Self::drag`], on a backend.
+    ///
+    /// # Errors
+    /// As [`Self::sag`].
+    pub fn drag_on(organs: &Organs, material: Material, backend: Backend) -> Result<Self> {
         let (speed, reach) = DRAG;
-        let mut scene = Self { name: "drag", ..Self::sag(organs, material)? };
+        let banded = |o: &Organ| pins::lowest_band(&o.mesh.vertices, DVec3::Z, PINNED);
+        let mut scene = Self::of("drag", &organs.organs, organs.appendix, (material, backend), banded)?;
         scene.patches = vec![scene.patch(scene.appendix, Motion::Drag { speed, reach })];
         Ok(scene)
     }
@@ -199,7 +208,8 @@ impl BenchScene {
                 grip.len()
             )));
         }
-        let mut scene = Self::of("tube", std::slice::from_ref(organ), 0, material, |_| end.clone())?;
+        let on = (material, Backend::Tetrahedra);
+        let mut scene = Self::of("tube", std::slice::from_ref(organ), 0, on, |_| end.clone())?;
         let (speed, seconds) = TUBE_LIFT;
         scene.patches = vec![Patch { body: 0, nodes: grip, motion: Motion::Lift { speed, seconds } }];
         Ok(scene)
@@ -210,7 +220,8 @@ impl BenchScene {
     /// # Errors
     /// As [`Self::sag`].
     pub fn fall(organs: &Organs, material: Material) -> Result<Self> {
-        Self::of("fall", std::slice::from_ref(&organs.organs[organs.appendix]), 0, material, |_| Vec::new())
+        let organ = std::slice::from_ref(&organs.organs[organs.appendix]);
+        Self::of("fall", organ, 0, (material, Backend::Tetrahedra), |_| Vec::new())
     }
 
     /// The appendix `count` times in one model. Each has its lowest 42% of nodes pinned and
@@ -228,10 +239,10 @@ impl BenchScene {
         name: &'static str,
         organs: &[Organ],
         appendix: usize,
-        material: Material,
+        (material, backend): (Material, Backend),
         pinned: impl Fn(&Organ) -> Vec<u32>,
     ) -> Result<Self> {
-        let mut builder = ModelBuilder::new().gravity(DVec3::Z * -GRAVITY);
+        let mut builder = ModelBuilder::new().gravity(DVec3::Z * -GRAVITY).backend(backend);
         for organ in organs {
             let name = organ.name.clone();
             let pinned = pinned(organ);

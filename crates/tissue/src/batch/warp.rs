@@ -1,0 +1,141 @@
+//! The rotation of the tissue about each node in each lane, which turns a gradient into the frame
+//! in which the stiffness at rest holds (stiffness warping, Mueller and others, "Stable real-time
+//! deformations", 2002).
+//!
+//! It only speeds the search up: any invertible matrices in place of the rotations keep the
+//! preconditioner symmetric and positive definite. So a few rounds of the polar decomposition are
+//! enough.
+
+use super::elastic::{areas, modes};
+use super::topology::Topology;
+use crate::registers::{Block, Reg, load, splat, store};
+use fearless_simd::{Select, Simd, SimdBase, SimdFloat};
+
+/// Rounds of the polar decomposition.
+const ROUNDS: usize = 3;
+
+/// Volume ratio below which a neighbourhood is not turned.
+const MIN_RATIO: f32 = 0.05;
+
+/// Rotations by node, each by columns.
+pub(super) type Rotations = Vec<[Block<f32>; 9]>;
+
+/// Computes the rotations at the displacements `u` (in cells).
+#[inline(always)]
+pub(super) fn update<S: Simd>(
+    simd: S,
+    topology: &Topology,
+    u: &[[Block<f32>; 3]],
+    rotations: &mut [[Block<f32>; 9]],
+    part: usize,
+) {
+    let zero = splat(simd, 0.0);
+    for rotation in rotations.iter_mut() {
+        for e in 0..9 {
+            store::<S>(zero, &mut rotation[e], part);
+        }
+    }
+    for cell in &topology.cells {
+        for k in 0..3 {
+            let m = modes(simd, u, &cell.nodes, k, part);
+            for node in &cell.nodes {
+                let rotation = &mut rotations[*node as usize];
+                for c in 0..3 {
+                    let to = &mut rotation[3 * c + k];
+                    store::<S>(load(simd, to, part) + m[c] * cell.volume, to, part);
+                }
+            }
+        }
+    }
+    for (rotation, weight) in rotations.iter_mut().zip(&topology.turning) {
+        let mut f = [zero; 9];
+        for e in 0..9 {
+            f[e] = load(simd, &rotation[e], part) * *weight;
+        }
+        for c in 0..3 {
+            f[4 * c] += 1.0;
+        }
+        let r = polar(simd, f);
+        for e in 0..9 {
+            store::<S>(r[e], &mut rotation[e], part);
+        }
+    }
+}
+
+/// The rotation of F, nearly: Newton's iteration (Higham, "Computing the polar decomposition",
+/// 1986), the first round scaled. The identity where F is flat.
+#[inline(always)]
+fn polar<S: Simd>(simd: S, f: [Reg<S>; 9]) -> [Reg<S>; 9] {
+    let (zero, one, half) = (splat(simd, 0.0), splat(simd, 1.0), splat(simd, 0.5));
+    let (_, ratio) = areas(&f);
+    // NaN compares false.
+    let sound = ratio.simd_gt(splat(simd, MIN_RATIO));
+    let mut x = f;
+    for e in 0..9 {
+        x[e] = sound.select(x[e], if e % 4 == 0 { one } else { zero });
+    }
+    for round in 0..ROUNDS {
+        let (cofactor, ratio) = areas(&x);
+        let inverse = one / ratio;
+        let (mut near, mut far) = (half, half * inverse);
+        if round == 0 {
+            let (mut size, mut other) = (zero, zero);
+            for e in 0..9 {
+                size += x[e] * x[e];
+                other += cofactor[e] * cofactor[e];
+            }
+            let scale = (other * inverse * inverse / size).sqrt().sqrt();
+            near *= scale;
+            far /= scale;
+        }
+        for e in 0..9 {
+            x[e] = x[e] * near + cofactor[e] * far;
+        }
+    }
+    x
+}
+
+/// Turns a field into the frame at rest, in place.
+#[inline(always)]
+pub(super) fn to_rest<S: Simd>(simd: S, rotations: &[[Block<f32>; 9]], v: &mut [[Block<f32>; 3]], part: usize) {
+    for (rotation, v) in rotations.iter().zip(v) {
+        let (x, y, z) = (load(simd, &v[0], part), load(simd, &v[1], part), load(simd, &v[2], part));
+        for c in 0..3 {
+            let (a, b, d) = (
+                load(simd, &rotation[3 * c], part),
+                load(simd, &rotation[3 * c + 1], part),
+                load(simd, &rotation[3 * c + 2], part),
+            );
+            store::<S>(a * x + b * y + d * z, &mut v[c], part);
+        }
+    }
+}
+
+/// Turns a field out of the frame at rest, in place. Returns the sum of its products with another
+/// field, if there is one.
+#[inline(always)]
+pub(super) fn out_of_rest<S: Simd>(
+    simd: S,
+    rotations: &[[Block<f32>; 9]],
+    v: &mut [[Block<f32>; 3]],
+    other: &[[Block<f32>; 3]],
+    part: usize,
+) -> Reg<S> {
+    let mut sums = [splat(simd, 0.0); 3];
+    for (i, (rotation, v)) in rotations.iter().zip(v).enumerate() {
+        let (x, y, z) = (load(simd, &v[0], part), load(simd, &v[1], part), load(simd, &v[2], part));
+        for k in 0..3 {
+            let (a, b, d) = (
+                load(simd, &rotation[k], part),
+                load(simd, &rotation[3 + k], part),
+                load(simd, &rotation[6 + k], part),
+            );
+            let turned = a * x + b * y + d * z;
+            store::<S>(turned, &mut v[k], part);
+            if let Some(other) = other.get(i) {
+                sums[k] += turned * load(simd, &other[k], part);
+            }
+        }
+    }
+    sums[0] + sums[1] + sums[2]
+}
