@@ -133,6 +133,13 @@ pub struct LiftResult {
     pub machine: Machine,
 }
 
+/// A surface file.
+struct Surface {
+    name: String,
+    path: PathBuf,
+    unit: Unit,
+}
+
 /// A timed frame.
 struct Frame {
     phase: &'static str,
@@ -154,10 +161,10 @@ impl Study for LiftBench {
         let threads = if self.threads == 0 { machine.cores } else { self.threads };
         let rows = surfaces
             .iter()
-            .map(|(name, surface, unit)| {
+            .map(|Surface { name, path, unit }| {
                 let folder = job.output().join("specimens").join(name);
                 if !folder.is_dir() {
-                    reconstruct_surface(surface, *unit, &Default::default(), &folder, job.progress)?;
+                    reconstruct_surface(path, *unit, &Default::default(), &folder, job.progress)?;
                 }
                 row(name, &Specimen::read(&folder)?, &folder, threads, job.progress)
             })
@@ -170,17 +177,17 @@ impl Study for LiftBench {
 
 impl LiftBench {
     /// The surfaces with their names and units, and what is left out.
-    fn surfaces(&self, job: &Job<'_>) -> Result<(Vec<(String, PathBuf, Unit)>, Vec<String>)> {
+    fn surfaces(&self, job: &Job<'_>) -> Result<(Vec<Surface>, Vec<String>)> {
         let named = |path: &Path, unit: Unit| {
             let name = path.file_stem().map_or_else(|| "organ".to_owned(), |n| n.to_string_lossy().into_owned());
-            (name, path.to_owned(), unit)
+            Surface { name, path: path.to_owned(), unit }
         };
         if !self.surfaces.is_empty() {
             return Ok((self.surfaces.iter().map(|path| named(path, self.units.into())).collect(), Vec::new()));
         }
         let path = job.output().join("own.ply");
         write_ply(&path, &ellipsoid(DVec3::from(OWN.1), SPACING))?;
-        let mut surfaces = vec![(OWN.0.to_owned(), path, Unit::Metre)];
+        let mut surfaces = vec![Surface { name: OWN.0.to_owned(), path, unit: Unit::Metre }];
         let real: Vec<PathBuf> = REAL.iter().map(|name| Path::new(DATA).join(name)).collect();
         let (there, absent): (Vec<PathBuf>, Vec<PathBuf>) = real.into_iter().partition(|path| path.is_file());
         surfaces.extend(there.iter().map(|path| named(path, Unit::Millimetre)));
