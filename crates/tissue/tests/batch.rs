@@ -229,7 +229,7 @@ fn a_free_body_falls_and_a_resting_one_rests() {
     }
 }
 
-/// The force of the tool bears the weight of what hangs on it alone.
+/// The force of the tool equals the weight that hangs on it.
 #[test]
 fn a_grasp_bears_the_weight() {
     let lattice = Lattice::of_mesh(&appendix(2.5e-3), &options(4e-3)).unwrap();

@@ -135,12 +135,12 @@ export class Cell {
     this.arms.forEach((arm, i) => {
       const pose = this.pose(i);
       const five = [0.1 * i, -0.05, 0.1, 0, arm.jaw];
-      const grasp = i === 0 ? [1, 0, 0, 0, 0, 0, 0, 0.5, 0.95, 0.4] : [0, 0, 0, 0, 0, 0, -1, 0, 0, 0];
-      const [attached = 0, held_back = 0, guarded = 0, load = 0, contactOff = 0, bladesOff = 0, organ = 0, s = 0, follow = 0, slip = 0] = grasp;
+      const grasp = i === 0 ? [1, 0, 0, 0, 0, 0, 0.5, 0.95, 0.4] : [0, 0, 0, 0, 0, -1, 0, 0, 0];
+      const [attached = 0, held_back = 0, guarded = 0, load = 0, pierces = 0, organ = 0, s = 0, follow = 0, slip = 0] = grasp;
       out.push(
         ...pose, ...arm.target, ...pose.slice(3), arm.jaw, arm.jaw * 1.05, ...five, ...five.slice(0, 4), arm.jawTarget,
         0.1, 0.2, 0.3 * i, 0, 0, i === 0 ? -0.4 : 0, 0.45, this.rcm(i), this.rcm(i) + 0.2,
-        attached, held_back, guarded, load, contactOff, bladesOff, organ, s, follow, slip,
+        attached, held_back, guarded, load, pierces, organ, s, follow, slip,
       );
     });
     return Float32Array.from(out);
