@@ -5,7 +5,7 @@
 //! - [`interpolate`]: linear and smooth interpolation of numbers.
 //! - [`median`]: of measured values.
 //! - [`Progress`]: how long work reports its progress and learns that it should stop.
-//! - [`thread_pool`]: worker threads, as many as a machine bears.
+//! - [`thread_pool`]: worker threads, as many as a machine bears; [`has_threads`].
 
 pub mod interpolate;
 mod pose;
@@ -19,7 +19,7 @@ pub use pose::Pose;
 pub use progress::{Progress, Quiet, Silent, StopAfter};
 pub use random::{Random, RandomSequence, mix, standard_normal, unit};
 pub use statistics::median;
-pub use threads::{MAX_THREADS, thread_pool};
+pub use threads::{MAX_THREADS, has_threads, thread_pool};
 pub use wrench::Wrench;
 
 #[cfg(doctest)]

@@ -18,6 +18,12 @@ pub fn thread_pool(threads: usize) -> Result<ThreadPool, String> {
     pool.map_err(|e| format!("{threads} threads cannot be started: {e}"))
 }
 
+/// Whether the caller is in a pool of several threads. Outside of one it is to do all the work: the
+/// global pool is not for it.
+pub fn has_threads() -> bool {
+    rayon::current_thread_index().is_some() && rayon::current_num_threads() > 1
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,13 +1,14 @@
 //! The factor: a multifrontal Cholesky factorisation over the tree of supernodes (Duff and Reid,
 //! "The multifrontal solution of indefinite sparse symmetric linear equations", 1983).
 
-use crate::dense::{COLUMNS, eliminate, first_of_band, has_threads, inverse_bands};
+use crate::dense::{COLUMNS, eliminate, first_of_band, inverse_bands};
 use crate::dissection::{Graph, dissect};
 use crate::supernodes::{Supernode, elimination_tree, postorder, supernodes};
 use crate::{BlockMatrix, Real};
 use fearless_simd::Level;
 use glam::DVec3;
 use rayon::prelude::*;
+use trocar_core::has_threads;
 
 /// Products of numbers below which the children of a supernode are eliminated on one thread.
 const SHARED: u64 = 1 << 20;

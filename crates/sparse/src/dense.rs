@@ -8,6 +8,7 @@
 use crate::Real;
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 use rayon::prelude::*;
+use trocar_core::has_threads;
 
 /// Columns that a kernel computes at once, and the multiple to which the columns of panels are
 /// filled up with zeros. It divides the lanes of each type.
@@ -89,12 +90,6 @@ fn bands<T: Real>(mut update: &mut [T]) -> Vec<&mut [T]> {
         update = rest;
     }
     list
-}
-
-/// Whether the caller is in a pool of several threads. Outside of one it does all the work: the
-/// global pool is not for it.
-pub(crate) fn has_threads() -> bool {
-    rayon::current_thread_index().is_some() && rayon::current_num_threads() > 1
 }
 
 /// Calls `f` with each item, on several threads if the `work` is worth it.

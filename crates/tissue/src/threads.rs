@@ -2,14 +2,10 @@
 //! global pool is not for it. How work is divided does not depend on the threads.
 
 use rayon::prelude::*;
+use trocar_core::has_threads;
 
 /// Parts that items are divided into, at most.
 const MAX_PARTS: usize = 8;
-
-/// Whether the caller is in a pool of several threads.
-pub(crate) fn has_threads() -> bool {
-    rayon::current_thread_index().is_some() && rayon::current_num_threads() > 1
-}
 
 /// Calls `work` with every item.
 pub(crate) fn for_each<T: Send>(items: &mut [T], work: impl Fn(&mut T) + Send + Sync) {

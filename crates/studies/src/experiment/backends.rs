@@ -1,17 +1,17 @@
 //! Rollouts of the six controllers on both tissue backends, and on lattices of several sizes of
 //! cells: whether another physics judges policies alike.
 
+use super::rollouts::campaign;
 use crate::names::SceneChoice;
 use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
-use trocar_campaign::{BackendsResult, Campaign, CampaignResult, PolicySpec};
+use trocar_campaign::{BackendsResult, Campaign, CampaignResult};
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::Card;
 use trocar_report::table::{count, fixed, or_dash};
-use trocar_scene::{BackendName, Split, VariationSet};
-use trocar_task::policy::POLICIES;
+use trocar_scene::BackendName;
 
 /// Rollouts of the six controllers on both tissue backends, on the same seeds, and on lattices of
 /// several sizes of cells: whether they judge policies alike; resumable.
@@ -95,7 +95,7 @@ impl Study for BackendsExperiment {
             return Err(Error::Mismatch(format!("--cells: {} is given twice", self.cells[twice])));
         }
         job.claim()?;
-        let campaign = self.campaign(self.rollouts)?;
+        let campaign = campaign(&self.scene, self.rollouts, self.seed, self.jobs)?;
         let output = job.output().join("both");
         let both = campaign.run_on(&BackendName::ALL, Some(self.rollouts), &output, job.progress)?;
         let cells = self.cells.iter().map(|cell| self.on_lattice(*cell, job)).collect::<Result<_>>()?;
@@ -116,30 +116,11 @@ impl Study for BackendsExperiment {
 }
 
 impl BackendsExperiment {
-    /// The campaign of `rollouts` rollouts, on the scene's own backend.
-    fn campaign(&self, rollouts: usize) -> Result<Campaign> {
-        Ok(Campaign {
-            scene: self.scene.scene.clone(),
-            policies: POLICIES.iter().map(|name| PolicySpec::parse(name)).collect::<std::result::Result<_, _>>()?,
-            episodes: rollouts.div_ceil(POLICIES.len()),
-            split: Split::Seen,
-            seed: self.seed,
-            variation: Some(VariationSet::None),
-            backend: None,
-            cell_mm: None,
-            by: Vec::new(),
-            jobs: self.jobs,
-            retry_failed: false,
-            surfaces: false,
-            phantoms: self.scene.phantoms.clone(),
-        })
-    }
-
     fn on_lattice(&self, cell_mm: f64, job: &Job<'_>) -> Result<CellRow> {
         let campaign = Campaign {
             backend: Some(BackendName::Lattice),
             cell_mm: Some(cell_mm),
-            ..self.campaign(self.cell_rollouts)?
+            ..campaign(&self.scene, self.cell_rollouts, self.seed, self.jobs)?
         };
         let output = job.output().join(format!("lattice-{cell_mm}-mm"));
         let (store, manifest, by) = campaign.run_episodes(&output, Some(self.cell_rollouts), job.progress)?;

@@ -130,21 +130,7 @@ impl Study for RolloutsExperiment {
         if self.rollouts == 0 {
             return Err(Error::Mismatch("--rollouts 0: must be at least 1; the paper has 140".to_owned()));
         }
-        let campaign = Campaign {
-            scene: self.scene.scene.clone(),
-            policies: POLICIES.iter().map(|name| PolicySpec::parse(name)).collect::<std::result::Result<_, _>>()?,
-            episodes: self.rollouts.div_ceil(POLICIES.len()),
-            split: Split::Seen,
-            seed: self.seed,
-            variation: Some(VariationSet::None),
-            backend: None,
-            cell_mm: None,
-            by: Vec::new(),
-            jobs: self.jobs,
-            retry_failed: false,
-            surfaces: false,
-            phantoms: self.scene.phantoms.clone(),
-        };
+        let campaign = campaign(&self.scene, self.rollouts, self.seed, self.jobs)?;
         let (store, manifest, by) = campaign.run_episodes(job.output(), Some(self.rollouts), job.progress)?;
         let (made, records) = (store.write_results(&manifest, &by)?, store.records(&manifest)?);
         let page = job.output().join(PAGE);
@@ -155,6 +141,26 @@ impl Study for RolloutsExperiment {
         store.write("rollouts.json", &text)?;
         Ok((result, document))
     }
+}
+
+/// The campaign of the six controllers without variation: `rollouts` in all, from `seed` on, `jobs` at
+/// once.
+pub(super) fn campaign(scene: &SceneChoice, rollouts: usize, seed: u64, jobs: usize) -> Result<Campaign> {
+    Ok(Campaign {
+        scene: scene.scene.clone(),
+        policies: POLICIES.iter().map(|name| PolicySpec::parse(name)).collect::<std::result::Result<_, _>>()?,
+        episodes: rollouts.div_ceil(POLICIES.len()),
+        split: Split::Seen,
+        seed,
+        variation: Some(VariationSet::None),
+        backend: None,
+        cell_mm: None,
+        by: Vec::new(),
+        jobs,
+        retry_failed: false,
+        surfaces: false,
+        phantoms: scene.phantoms.clone(),
+    })
 }
 
 impl RolloutsResult {

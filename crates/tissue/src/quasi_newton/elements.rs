@@ -7,9 +7,9 @@ use crate::Body;
 use crate::inversion_guard::{KEPT_SHARE, MIN_SQUARED_LENGTH, MIN_VOLUME_RATIO, is_squeezed};
 use crate::lanes::{LANES, Mat3L, Row, Vec3L, add, apply, cross, dot, gather, load, scale, splat, store_rows, sub};
 use crate::material::{MAX_FREE_STRETCH_SQUARED, StretchEnergy};
-use crate::threads::has_threads;
 use fearless_simd::{Level, Simd, SimdBase, dispatch, f32x16};
 use std::collections::BTreeMap;
+use trocar_core::has_threads;
 
 /// Fewest batches that are worth a thread of their own.
 const MIN_BATCHES: usize = 600;
