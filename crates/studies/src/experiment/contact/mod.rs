@@ -6,7 +6,7 @@ mod result;
 mod scene;
 mod theory;
 
-pub use result::{BodyRow, ContactResult, DragRow, SphereRow};
+pub use result::{BodyRow, ContactResult, DragRow, FineRow, SphereRow};
 
 use crate::Result;
 use crate::scenes::{FRAME, reference};
@@ -46,8 +46,12 @@ const STIFF: f64 = 50.0;
 #[derive(Clone, Debug, Args)]
 pub struct ContactExperiment {
     /// Elements over the thickness of the layer (8 mm); 2, 4 and 6 by default.
-    #[arg(long = "cells", value_parser = clap::value_parser!(u16).range(1..=16))]
+    #[arg(long = "cells", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=16))]
     pub cells: Vec<u16>,
+    /// Elements over the thickness of finer layers, which the fast solver alone presses on.
+    #[arg(long, value_name = "CELLS", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=16),
+          default_values_t = [8, 10, 12])]
+    pub finer: Vec<u16>,
     /// Young's modulus (Pa).
     #[arg(long, default_value_t = 5e3)]
     pub young_modulus: f64,
@@ -65,6 +69,7 @@ pub struct ContactExperiment {
 impl Study for ContactExperiment {
     const NAME: &'static str = "contact";
     const KIND: Kind = Kind::Experiment;
+    const SCHEMA: u32 = 2;
     type Figures = ContactResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(ContactResult, Document)> {
@@ -90,14 +95,22 @@ impl Study for ContactExperiment {
             radius_mm: 1e3 * RADIUS,
             depth_mm: self.depth_mm,
             spheres: Vec::new(),
+            fine: Vec::new(),
             drags: Vec::new(),
             bodies: Vec::new(),
         };
         let material = scene::material(self.young_modulus, self.poisson_ratio);
-        job.progress.begin("contact", (modes.len() * (cells.len() + coarse.len()) + cells.len()) as u64);
+        let pressed = cells.len() + self.finer.len() + coarse.len();
+        job.progress.begin("contact", (modes.len() * pressed + cells.len()) as u64);
         for mode in modes {
             for cells in &cells {
                 result.spheres.push(self.sphere(*cells, material, mode, job.progress)?);
+                job.progress.advance(1);
+            }
+        }
+        for mode in modes {
+            for cells in &self.finer {
+                result.fine.push(self.fine(usize::from(*cells), material, mode, job.progress)?);
                 job.progress.advance(1);
             }
         }
@@ -180,6 +193,15 @@ fn distance_from_surface(model: &Model, state: &State, p: DVec3) -> f64 {
     (0..surface.triangles.len()).map(distance).fold(f64::INFINITY, f64::min)
 }
 
+/// A sphere in the layer, pressed by the fast solver.
+struct Pressed {
+    model: Model,
+    state: State,
+    touching: usize,
+    force_n: f64,
+    overlap_mm: f64,
+}
+
 impl ContactExperiment {
     fn sphere(
         &self,
@@ -188,42 +210,76 @@ impl ContactExperiment {
         mode: ToolContact,
         progress: &dyn Progress,
     ) -> Result<SphereRow> {
-        let depth = 1e-3 * self.depth_mm;
-        let shape = || Shape::Sphere { centre: middle(cells), radius: RADIUS };
-        let lowered = |share: f64| at(DVec3::Z * (THICKNESS + RADIUS - depth * share));
-        let model = scene::layer(cells, material, shape(), 0.0, mode, 1.0)?;
-        let mut state = State::new(&model);
-        let stepper = stepped(&model, &mut state, DOWN + REST, |k| lowered(down(k)), progress)?;
+        let Pressed { model, state, touching, force_n, overlap_mm } = self.pressed(cells, material, mode, progress)?;
         let settled = |model: &Model| -> Result<(f64, OracleState)> {
             let (mut oracle, mut exact) = (Oracle::new(model), OracleState::new(model));
             for part in 1..=PARTS {
                 check_interrupted(progress)?;
-                let pose = lowered(f64::from(part) / f64::from(PARTS));
+                let pose = self.lowered(f64::from(part) / f64::from(PARTS));
                 oracle.settle_with_tools(model, &mut exact, &[], &[pose]).map_err(reference)?;
             }
             Ok((oracle.forces()[0].contact.force.z, exact))
         };
         let (truth, exact) = settled(&model)?;
         // Some states of stiff contact have no minimum that Newton's method finds.
-        let stiff = settled(&scene::layer(cells, material, shape(), 0.0, mode, STIFF)?).ok().map(|(force, _)| force);
-        let force = stepper.forces()[0];
-        let centre = middle(cells) + lowered(1.0).translation;
-        let hertz = theory::hertz(self.young_modulus, self.poisson_ratio, RADIUS, depth);
+        let stiff = settled(&self.layer(cells, material, mode, STIFF)?).ok().map(|(force, _)| force);
+        let [hertz_n, layer_n] = self.theory();
         Ok(SphereRow {
             tool_contact: name(mode),
             cells,
             edge_mm: 1e3 * THICKNESS / cells as f64,
             nodes: model.bodies()[0].len(),
-            touching: force.touching,
-            fast_n: force.contact.force.z,
+            touching,
+            fast_n: force_n,
             oracle_n: truth,
-            force_error: (force.contact.force.z / truth - 1.0).abs(),
+            force_error: (force_n / truth - 1.0).abs(),
             field_error: field_error(&model, &state, &exact),
             stiff_n: stiff,
-            overlap_mm: 1e3 * (RADIUS - distance_from_surface(&model, &state, centre)).max(0.0),
-            hertz_n: hertz,
-            layer_n: hertz * theory::layer_over_half_space(self.poisson_ratio, RADIUS, depth, THICKNESS),
+            overlap_mm,
+            hertz_n,
+            layer_n,
         })
+    }
+
+    fn fine(&self, cells: usize, material: Material, mode: ToolContact, progress: &dyn Progress) -> Result<FineRow> {
+        let Pressed { model, touching, force_n, overlap_mm, .. } = self.pressed(cells, material, mode, progress)?;
+        let [_, layer_n] = self.theory();
+        Ok(FineRow {
+            tool_contact: name(mode),
+            edge_mm: 1e3 * THICKNESS / cells as f64,
+            nodes: model.bodies()[0].len(),
+            touching,
+            force_n,
+            overlap_mm,
+            layer_n,
+            layer_error: force_n / layer_n - 1.0,
+        })
+    }
+
+    /// Forces of a half-space and of the layer (N).
+    fn theory(&self) -> [f64; 2] {
+        let depth = 1e-3 * self.depth_mm;
+        let hertz = theory::hertz(self.young_modulus, self.poisson_ratio, RADIUS, depth);
+        [hertz, hertz * theory::layer_over_half_space(self.poisson_ratio, RADIUS, depth, THICKNESS)]
+    }
+
+    /// The sphere's pose at a share of its way down.
+    fn lowered(&self, share: f64) -> Pose {
+        at(DVec3::Z * (THICKNESS + RADIUS - 1e-3 * self.depth_mm * share))
+    }
+
+    fn layer(&self, cells: usize, material: Material, mode: ToolContact, stiffer: f64) -> Result<Model> {
+        scene::layer(cells, material, Shape::Sphere { centre: middle(cells), radius: RADIUS }, 0.0, mode, stiffer)
+    }
+
+    fn pressed(&self, cells: usize, material: Material, mode: ToolContact, progress: &dyn Progress) -> Result<Pressed> {
+        let model = self.layer(cells, material, mode, 1.0)?;
+        let mut state = State::new(&model);
+        let stepper = stepped(&model, &mut state, DOWN + REST, |k| self.lowered(down(k)), progress)?;
+        let force = stepper.forces()[0];
+        let centre = middle(cells) + self.lowered(1.0).translation;
+        let overlap_mm = 1e3 * (RADIUS - distance_from_surface(&model, &state, centre)).max(0.0);
+        Ok(Pressed { touching: force.touching, force_n: force.contact.force.z, overlap_mm, model, state })
     }
 
     fn drag(&self, cells: usize, material: Material, mode: ToolContact, progress: &dyn Progress) -> Result<DragRow> {

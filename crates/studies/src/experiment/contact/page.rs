@@ -10,7 +10,11 @@ const MAX_ERROR: f64 = 0.02;
 const MAX_ERROR_DRAGGED: f64 = 0.04;
 
 pub(super) fn document(r: &ContactResult) -> Document {
-    Document::new("Contact", "Contact beside the oracle and Hertz").with(spheres(r)).with(drags(r)).with(bodies(r))
+    Document::new("Contact", "Contact beside the oracle and Hertz")
+        .with(spheres(r))
+        .with(fine(r))
+        .with(drags(r))
+        .with(bodies(r))
 }
 
 fn spheres(r: &ContactResult) -> Section {
@@ -52,6 +56,24 @@ fn spheres(r: &ContactResult) -> Section {
         ],
     );
     Section::new("A pressed sphere", lead).cards(cards).table(table)
+}
+
+fn fine(r: &ContactResult) -> Section {
+    let lead = "The fast solver on finer meshes, beside Hertz's force for the layer.";
+    let table = Table::of(
+        &r.fine,
+        &[
+            ("Contact", &|row| row.tool_contact.clone()),
+            ("Edge (mm)", &|row| fixed(row.edge_mm, 2)),
+            ("Nodes", &|row| count(row.nodes)),
+            ("Touching", &|row| count(row.touching)),
+            ("Force (N)", &|row| fixed(row.force_n, 4)),
+            ("Overlap (mm)", &|row| fixed(row.overlap_mm, 3)),
+            ("Layer (N)", &|row| fixed(row.layer_n, 4)),
+            ("Over the layer's", &|row| percent(row.layer_error, 1)),
+        ],
+    );
+    Section::new("Finer meshes", lead).table(table)
 }
 
 fn drags(r: &ContactResult) -> Section {

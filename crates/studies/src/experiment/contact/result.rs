@@ -33,6 +33,27 @@ pub struct SphereRow {
     pub layer_n: f64,
 }
 
+/// A sphere pressed into a finer layer by the fast solver.
+#[derive(Clone, Debug, Serialize)]
+pub struct FineRow {
+    /// What touches: `vertices` or `surface`.
+    pub tool_contact: String,
+    /// Edge of the triangles (mm).
+    pub edge_mm: f64,
+    /// Nodes of the mesh.
+    pub nodes: usize,
+    /// Points of the surface that press.
+    pub touching: usize,
+    /// Force (N).
+    pub force_n: f64,
+    /// How far the sphere reaches into the surface (mm).
+    pub overlap_mm: f64,
+    /// Hertz's force for a bonded layer of this thickness (N).
+    pub layer_n: f64,
+    /// Force over that of the layer, less 1.
+    pub layer_error: f64,
+}
+
 /// A capsule dragged along the layer.
 #[derive(Clone, Debug, Serialize)]
 pub struct DragRow {
@@ -82,6 +103,8 @@ pub struct ContactResult {
     pub depth_mm: f64,
     /// Spheres.
     pub spheres: Vec<SphereRow>,
+    /// Spheres in finer layers.
+    pub fine: Vec<FineRow>,
     /// Capsules.
     pub drags: Vec<DragRow>,
     /// Bodies.
