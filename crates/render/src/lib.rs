@@ -53,6 +53,7 @@ pub mod random;
 mod raster;
 mod rays;
 mod render;
+mod samples;
 mod shading_frame;
 pub mod srgb;
 mod stage;

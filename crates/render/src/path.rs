@@ -3,35 +3,13 @@
 
 use crate::bvh::{Ray, Stacks};
 use crate::material::{Material, cosine_direction};
-use crate::random::numbers;
+use crate::samples::{PathSample, Purpose};
 use crate::shading_frame::{ShadingFrame, offset};
 use crate::stage::{Stage, StageHit, Surface};
 use glam::Vec3A;
 
 /// Number of bounces before Russian roulette starts.
 const ROULETTE_START: u32 = 3;
-
-/// Key of the random numbers of one path.
-#[derive(Clone, Copy)]
-pub(crate) struct Key {
-    pub seed: u32,
-    pub pixel: u32,
-    pub sample: u32,
-}
-
-impl Key {
-    /// Four random numbers for `purpose` at a bounce.
-    pub fn draw(self, bounce: u32, purpose: u32) -> [f32; 4] {
-        numbers([self.pixel, self.sample, bounce << 8 | purpose, self.seed])
-    }
-}
-
-/// Purposes of random numbers. Light `i` uses `LIGHTS + i`.
-pub(crate) const LENS: u32 = 0;
-const DIRECTION: u32 = 1;
-const SUBSURFACE: u32 = 2;
-const ROULETTE: u32 = 3;
-const LIGHTS: u32 = 16;
 
 /// A surface point where light is gathered, with its local frame.
 struct PathVertex {
@@ -47,7 +25,7 @@ pub(crate) fn radiance(
     origin: Vec3A,
     direction: Vec3A,
     bounces: u32,
-    key: Key,
+    sample: PathSample,
     stacks: &mut Stacks,
 ) -> Vec3A {
     let (mut origin, mut direction) = (origin, direction);
@@ -70,12 +48,22 @@ pub(crate) fn radiance(
         let material = if bounce == 0 { stage.material(&hit) } else { stage.path_material(&hit) };
         let visible = PathVertex { surface, frame: ShadingFrame::new(surface.smooth), weight: Vec3A::ONE };
         let to_eye = visible.frame.local(-direction.normalize());
-        let entry = if bounce == 0 { subsurface_entry(stage, &hit, &visible, material, key, stacks) } else { None };
+        let entry = if bounce == 0 { subsurface_entry(stage, &hit, &visible, material, sample, stacks) } else { None };
         let gloss_probability = material.gloss_probability(surface.albedo, to_eye);
         sum += throughput
-            * direct_light(stage, &visible, entry.as_ref(), material, to_eye, gloss_probability, bounce, key, stacks);
+            * direct_light(
+                stage,
+                &visible,
+                entry.as_ref(),
+                material,
+                to_eye,
+                gloss_probability,
+                bounce,
+                sample,
+                stacks,
+            );
 
-        let [choice, a, b, _] = key.draw(bounce, DIRECTION);
+        let [choice, a, b, _] = sample.draw(Purpose::Direction(bounce));
         let (vertex, towards, factor, chosen) = if choice < gloss_probability {
             let Some(towards) = material.sample_gloss(to_eye, [a, b]) else { return sum };
             let lobes = material.lobes(surface.albedo, to_eye, towards);
@@ -96,7 +84,7 @@ pub(crate) fn radiance(
         origin = vertex.surface.position + vertex.surface.flat * offset(vertex.surface.position);
         if bounce >= ROULETTE_START {
             let survives = throughput.max_element().min(0.95);
-            if survives.is_nan() || key.draw(bounce, ROULETTE)[0] >= survives {
+            if survives.is_nan() || sample.draw(Purpose::Roulette(bounce))[0] >= survives {
                 return sum;
             }
             throughput /= survives;
@@ -130,12 +118,12 @@ fn direct_light(
     to_eye: Vec3A,
     gloss_probability: f32,
     bounce: u32,
-    key: Key,
+    sample: PathSample,
     stacks: &mut Stacks,
 ) -> Vec3A {
     let mut sum = Vec3A::ZERO;
     for (index, lamp) in stage.lamps().iter().enumerate() {
-        let [a, b, ..] = key.draw(bounce, LIGHTS + (index as u32 & 0x7f));
+        let [a, b, ..] = sample.draw(Purpose::Light(bounce, index as u32));
         let mut gather = |vertex: &PathVertex, gloss: bool, base: bool| {
             let Some(arriving) = lamp.arriving(vertex.surface.position, [a, b]) else { return };
             if arriving.direction.dot(vertex.surface.flat) <= 0.0 {
@@ -190,14 +178,14 @@ fn subsurface_entry(
     hit: &StageHit,
     visible: &PathVertex,
     material: &Material,
-    key: Key,
+    sample: PathSample,
     stacks: &mut Stacks,
 ) -> Option<PathVertex> {
     let lengths = material.scattering_length;
     if lengths == Vec3A::ZERO {
         return None;
     }
-    let [which, a, b, turn] = key.draw(0, SUBSURFACE);
+    let [which, a, b, turn] = sample.draw(Purpose::Subsurface);
     let length = lengths[((which * 3.0) as usize).min(2)];
     // A quarter of the profile decays with the length, the rest with three times the length.
     let scale = if a < 0.25 { length } else { 3.0 * length };

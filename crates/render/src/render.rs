@@ -3,11 +3,12 @@
 use crate::bvh::Stacks;
 use crate::direct::{self, ShadowBuffers, VisiblePoint};
 use crate::film::Film;
-use crate::path::{Key, LENS, radiance};
+use crate::path::radiance;
 use crate::picture::{Picture, Rows};
 use crate::preview::preview;
 use crate::raster::View;
 use crate::rays::{RayGenerator, TILE};
+use crate::samples::{PathSample, PixelSamples, Purpose};
 use crate::stage::{BundleCandidates, Stage, rotation_of};
 use glam::Vec3A;
 use rayon::prelude::*;
@@ -168,13 +169,13 @@ impl Shot<'_> {
             RenderSettings::Path { samples, bounces, seed } => {
                 for (i, _) in rays.iter() {
                     let pixel = first * width + i;
-                    let key = |sample| Key { seed, pixel: pixel as u32, sample };
+                    let of_pixel = PixelSamples::new(pixel as u32, seed);
                     let mut sum = Vec3A::ZERO;
-                    for sample in 0..samples.max(1) {
-                        let key = key(sample);
-                        let [a, b, ..] = key.draw(0, LENS);
+                    for number in 0..samples.max(1) {
+                        let sample: PathSample = of_pixel.sample(number);
+                        let [a, b, ..] = sample.draw(Purpose::Lens);
                         if let Some(ray) = view.rays.at(pixel, a, b) {
-                            let light = radiance(stage, view.origin, view.rotation * ray, bounces, key, stacks);
+                            let light = radiance(stage, view.origin, view.rotation * ray, bounces, sample, stacks);
                             sum += light * (MAX_PATH_RADIANCE / light.max_element().max(MAX_PATH_RADIANCE));
                         }
                     }

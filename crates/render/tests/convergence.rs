@@ -1,5 +1,5 @@
-//! The error of path tracing falls with the square root of the number of samples, in a box lit from
-//! its ceiling.
+//! The error of path tracing falls faster than with the square root of the number of samples, in a
+//! box lit from its ceiling: the samples of a pixel are a low-discrepancy sequence.
 
 #![allow(clippy::unwrap_used, reason = "test helpers may panic")]
 
@@ -38,7 +38,7 @@ fn stage() -> Stage {
 }
 
 #[test]
-fn error_falls_with_the_square_root_of_the_samples() {
+fn error_falls_faster_than_with_the_square_root_of_the_samples() {
     let eye = RayGenerator::new(Camera::centred(24, 24, 0.9));
     let mut stage = stage();
     let mut light = |samples: u32, seed: u32| -> Vec<f64> {
@@ -50,12 +50,12 @@ fn error_falls_with_the_square_root_of_the_samples() {
     let mean = truth.iter().sum::<f64>() / truth.len() as f64;
     assert!(mean > 0.1, "the box is lit: {mean}");
     let mut error = |samples: u32| {
-        // Several seeds, so that the estimate can distinguish an exponent of 0.5 from 0.45.
+        // Several seeds, so that the estimate is good to 0.05.
         let squares: f64 =
             (0..4).map(|seed| light(samples, seed).iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).sum::<f64>()).sum();
         (squares / (4.0 * truth.len() as f64)).sqrt()
     };
     let (few, many) = (error(4), error(128));
     let power = (few / many).ln() / 32.0_f64.ln();
-    assert!((power - 0.5).abs() < 0.05, "error {few} at 4 samples, {many} at 128: samples to the power -{power}");
+    assert!(power > 0.7, "error {few} at 4 samples, {many} at 128: samples to the power -{power}");
 }
