@@ -38,6 +38,7 @@
 mod background;
 mod bvh;
 mod deferred;
+mod denoise;
 mod direct;
 mod error;
 mod film;

@@ -19,15 +19,29 @@ struct PathVertex {
     weight: Vec3A,
 }
 
-/// Radiance along one path from `origin` in `direction` with at most `bounces` bounces.
+/// What a path sees first.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FirstHit {
+    /// Linear colour of the surface; white where there is none.
+    pub albedo: Vec3A,
+    /// Its unit normal; zero where there is none.
+    pub normal: Vec3A,
+    /// Its place relative to the eye (m).
+    pub place: Vec3A,
+}
+
+/// Radiance along one path from `origin` in `direction` with at most `bounces` bounces. Writes what
+/// it sees first.
 pub(crate) fn radiance(
     stage: &Stage,
     origin: Vec3A,
     direction: Vec3A,
     bounces: u32,
     sample: PathSample,
+    first: &mut FirstHit,
     stacks: &mut Stacks,
 ) -> Vec3A {
+    *first = FirstHit { albedo: Vec3A::ONE, normal: Vec3A::ZERO, place: direction };
     let (mut origin, mut direction) = (origin, direction);
     let mut throughput = Vec3A::ONE;
     let mut sum = Vec3A::ZERO;
@@ -45,6 +59,9 @@ pub(crate) fn radiance(
             return sum;
         }
         let surface = stage.surface(&hit, direction);
+        if bounce == 0 {
+            *first = FirstHit { albedo: surface.albedo, normal: surface.smooth, place: surface.position - origin };
+        }
         let material = if bounce == 0 { stage.material(&hit) } else { stage.path_material(&hit) };
         let visible = PathVertex { surface, frame: ShadingFrame::new(surface.smooth), weight: Vec3A::ONE };
         let to_eye = visible.frame.local(-direction.normalize());

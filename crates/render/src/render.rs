@@ -1,14 +1,15 @@
 //! Rendering a stage: rasterised, with a ray per pixel, or with many paths per pixel.
 
 use crate::bvh::Stacks;
+use crate::denoise::{Guide, denoise};
 use crate::direct::{self, ShadowBuffers, VisiblePoint};
 use crate::film::Film;
-use crate::path::radiance;
+use crate::path::{FirstHit, radiance};
 use crate::picture::{Picture, Rows};
 use crate::preview::preview;
 use crate::raster::View;
 use crate::rays::{RayGenerator, TILE};
-use crate::samples::{PathSample, PixelSamples, Purpose};
+use crate::samples::{PixelSamples, Purpose};
 use crate::stage::{BundleCandidates, Stage, rotation_of};
 use glam::Vec3A;
 use rayon::prelude::*;
@@ -40,6 +41,9 @@ pub enum RenderSettings {
         bounces: u32,
         /// Seed of the noise.
         seed: u32,
+        /// Filters the noise out, guided by the surfaces that the paths see first. Detail of light
+        /// that is weaker than the noise goes with it.
+        denoise: bool,
     },
 }
 
@@ -49,9 +53,14 @@ impl RenderSettings {
         Self::Preview { shadows: true }
     }
 
-    /// Path tracing with at most eight bounces.
+    /// Path tracing with at most eight bounces, without a filter.
     pub fn path(samples: u32) -> Self {
-        Self::Path { samples, bounces: 8, seed: 0 }
+        Self::Path { samples, bounces: 8, seed: 0, denoise: false }
+    }
+
+    /// Path tracing with at most eight bounces, whose noise is filtered out.
+    pub fn denoised(samples: u32) -> Self {
+        Self::Path { samples, bounces: 8, seed: 0, denoise: true }
     }
 }
 
@@ -84,13 +93,23 @@ pub fn render_into(
         return;
     }
     stage.update_acceleration();
-    let shot = Shot { stage, view, settings };
-    picture.bands(rays.width() * TILE).for_each_init(TileBuffers::new, |buffers, (k, mut rows)| {
-        for left in (0..rays.width()).step_by(TILE) {
-            shot.tile(k * TILE, left, &mut rows, buffers);
+    let filters = matches!(settings, RenderSettings::Path { denoise: true, .. });
+    let (width, shot) = (rays.width(), Shot { stage, view, settings });
+    let mut guides = vec![Guide::default(); if filters { width * rays.height() } else { 0 }];
+    let mut guided: Vec<&mut [Guide]> = guides.chunks_mut((width * TILE).max(1)).collect();
+    guided.resize_with(rays.height().div_ceil(TILE), Default::default);
+    picture.bands(width * TILE).zip(guided).for_each_init(TileBuffers::new, |buffers, ((k, mut rows), guides)| {
+        for left in (0..width).step_by(TILE) {
+            shot.tile(k * TILE, left, (&mut rows, &mut *guides), buffers);
         }
-        rows.develop(film, rays, k * TILE);
+        if !filters {
+            rows.develop(film, rays, k * TILE);
+        }
     });
+    if filters {
+        denoise(&guides, width, &mut picture.light);
+        picture.bands(width * TILE).for_each(|(k, mut rows)| rows.develop(film, rays, k * TILE));
+    }
 }
 
 struct Shot<'a> {
@@ -129,7 +148,13 @@ impl TileBuffers {
 
 impl Shot<'_> {
     /// Renders the pixels of a tile whose first row is `first` and whose first column is `left`.
-    fn tile(&self, first: usize, left: usize, rows: &mut Rows<'_>, buffers: &mut TileBuffers) {
+    fn tile(
+        &self,
+        first: usize,
+        left: usize,
+        (rows, guides): (&mut Rows<'_>, &mut [Guide]),
+        buffers: &mut TileBuffers,
+    ) {
         let Self { stage, view, settings } = self;
         let width = view.rays.width();
         let TileBuffers { stacks, rays, directions, candidates, visible, pixel_indices, shadow_buffers } = buffers;
@@ -166,22 +191,46 @@ impl Shot<'_> {
                     rows.light[*i] = visible.light.to_array();
                 }
             }
-            RenderSettings::Path { samples, bounces, seed } => {
+            RenderSettings::Path { samples, bounces, seed, .. } => {
                 for (i, _) in rays.iter() {
-                    let pixel = first * width + i;
-                    let of_pixel = PixelSamples::new(pixel as u32, seed);
-                    let mut sum = Vec3A::ZERO;
-                    for number in 0..samples.max(1) {
-                        let sample: PathSample = of_pixel.sample(number);
-                        let [a, b, ..] = sample.draw(Purpose::Lens);
-                        if let Some(ray) = view.rays.at(pixel, a, b) {
-                            let light = radiance(stage, view.origin, view.rotation * ray, bounces, sample, stacks);
-                            sum += light * (MAX_PATH_RADIANCE / light.max_element().max(MAX_PATH_RADIANCE));
-                        }
+                    let pixel = PixelSamples::new((first * width + i) as u32, seed);
+                    let (light, guide) = self.pixel(first * width + i, pixel, (samples.max(1), bounces), stacks);
+                    rows.light[*i] = light.to_array();
+                    if let Some(to) = guides.get_mut(*i) {
+                        *to = guide;
                     }
-                    rows.light[*i] = (sum / samples.max(1) as f32).to_array();
                 }
             }
         }
+    }
+
+    /// The mean of a pixel's paths, and what guides the filter.
+    fn pixel(
+        &self,
+        index: usize,
+        pixel: PixelSamples,
+        (samples, bounces): (u32, u32),
+        stacks: &mut Stacks,
+    ) -> (Vec3A, Guide) {
+        let Self { stage, view, .. } = self;
+        let (mut halves, [mut albedo, mut normal, mut place]) = ([Vec3A::ZERO; 2], [Vec3A::ZERO; 3]);
+        let mut first = FirstHit { albedo, normal, place };
+        let early = samples.div_ceil(2);
+        for number in 0..samples {
+            let sample = pixel.sample(number);
+            let [a, b, ..] = sample.draw(Purpose::Lens);
+            let Some(ray) = view.rays.at(index, a, b) else { continue };
+            let found = radiance(stage, view.origin, view.rotation * ray, bounces, sample, &mut first, stacks);
+            let dimmed = found * (MAX_PATH_RADIANCE / found.max_element().max(MAX_PATH_RADIANCE));
+            halves[usize::from(number >= early)] += dimmed;
+            albedo += first.albedo;
+            normal += first.normal;
+            place += first.place;
+        }
+        let light = (halves[0] + halves[1]) / samples as f32;
+        let [a, b] = [halves[0] / early as f32, halves[1] / (samples - early).max(1) as f32];
+        let halves = [a, if samples > 1 { b } else { a }].map(|half| half.to_array());
+        let mean = |sum: Vec3A| (sum / samples as f32).to_array();
+        (light, Guide { halves, albedo: mean(albedo), normal: mean(normal), place: mean(place) })
     }
 }

@@ -42,7 +42,7 @@ fn error_falls_faster_than_with_the_square_root_of_the_samples() {
     let eye = RayGenerator::new(Camera::centred(24, 24, 0.9));
     let mut stage = stage();
     let mut light = |samples: u32, seed: u32| -> Vec<f64> {
-        let settings = RenderSettings::Path { samples, bounces: 6, seed };
+        let settings = RenderSettings::Path { samples, bounces: 6, seed, denoise: false };
         let picture = render(&mut stage, &eye, &Pose::IDENTITY, &settings, &Film::default());
         picture.light.iter().flatten().map(|l| f64::from(*l)).collect()
     };
@@ -58,4 +58,22 @@ fn error_falls_faster_than_with_the_square_root_of_the_samples() {
     let (few, many) = (error(4), error(128));
     let power = (few / many).ln() / 32.0_f64.ln();
     assert!(power > 0.7, "error {few} at 4 samples, {many} at 128: samples to the power -{power}");
+}
+
+/// The filter halves the error of a picture of few paths, and changes its mean colour by little.
+#[test]
+fn noise_is_filtered_out() {
+    let eye = RayGenerator::new(Camera::centred(160, 160, 0.9));
+    let mut stage = stage();
+    let mut picture = |samples: u32, seed: u32, denoise: bool| -> Vec<f64> {
+        let settings = RenderSettings::Path { samples, bounces: 6, seed, denoise };
+        let picture = render(&mut stage, &eye, &Pose::IDENTITY, &settings, &Film::default());
+        picture.color.pixels.iter().flatten().map(|c| f64::from(*c)).collect()
+    };
+    let (truth, raw, filtered) = (picture(200, 1000, false), picture(4, 1, false), picture(4, 1, true));
+    let error =
+        |made: &[f64]| (made.iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / truth.len() as f64).sqrt();
+    assert!(error(&filtered) < 0.6 * error(&raw), "4 paths: {}, filtered: {}", error(&raw), error(&filtered));
+    let mean = |made: &[f64]| made.iter().sum::<f64>() / made.len() as f64;
+    assert!((mean(&filtered) - mean(&truth)).abs() < 1.0, "mean {} and {}", mean(&filtered), mean(&truth));
 }

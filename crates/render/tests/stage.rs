@@ -145,10 +145,10 @@ fn picture_does_not_depend_on_thread_count() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| render(&mut stage, &RayGenerator::new(camera(61, 47)), &Pose::IDENTITY, settings, &film))
     };
-    for settings in [RenderSettings::preview(), RenderSettings::path(4)] {
+    for settings in [RenderSettings::preview(), RenderSettings::path(4), RenderSettings::denoised(4)] {
         assert!(picture(1, &settings) == picture(2, &settings), "{settings:?}");
     }
-    let other = RenderSettings::Path { samples: 4, bounces: 8, seed: 1 };
+    let other = RenderSettings::Path { samples: 4, bounces: 8, seed: 1, denoise: false };
     assert!(picture(1, &other) != picture(1, &RenderSettings::path(4)), "another seed gives other noise");
 }
 
@@ -166,7 +166,7 @@ fn white_body_is_invisible_in_a_white_room() {
         let look = Appearance { color: [255; 3], surface: kind };
         stage.add_mesh(&sphere(DVec3::new(0.0, 0.0, 0.3), 0.1, 300), 1, &look).unwrap();
         let eye = RayGenerator::new(camera(32, 32));
-        let settings = RenderSettings::Path { samples: 256, bounces: 32, seed: 3 };
+        let settings = RenderSettings::Path { samples: 256, bounces: 32, seed: 3, denoise: false };
         let picture = render(&mut stage, &eye, &Pose::IDENTITY, &settings, &Film::default());
         let seen: Vec<usize> = (0..32 * 32).filter(|i| picture.labels[*i] == 1).collect();
         assert!(seen.len() > 100);
@@ -194,7 +194,7 @@ fn panel_light_matches_its_form_factor() {
     // Seen from the side, below the panel, with a field of view of a millimetre around the centre.
     let pose = Pose::look_at(DVec3::new(0.1, 0.0, 0.2), DVec3::new(0.0, 0.0, 0.3), DVec3::Y);
     let eye = RayGenerator::new(Camera::centred(8, 8, 0.005));
-    let settings = RenderSettings::Path { samples: 4000, bounces: 4, seed: 0 };
+    let settings = RenderSettings::Path { samples: 4000, bounces: 4, seed: 0, denoise: false };
     let picture = render(&mut stage, &eye, &pose, &settings, &Film::default());
     let mean = picture.light.iter().map(|l| f64::from(l[0])).sum::<f64>() / 64.0;
     let x = a / (a * a + h * h).sqrt();
@@ -237,7 +237,9 @@ fn lamp_beside_the_lens_casts_a_shadow_in_both_settings() {
         picture.light[i][0]
     };
     // The lamp's ray through the centre of the ball meets the floor at x = -0.05.
-    for settings in [RenderSettings::preview(), RenderSettings::Path { samples: 4, bounces: 1, seed: 0 }] {
+    for settings in
+        [RenderSettings::preview(), RenderSettings::Path { samples: 4, bounces: 1, seed: 0, denoise: false }]
+    {
         let picture = render(&mut stage, &RayGenerator::new(camera), &Pose::IDENTITY, &settings, &Film::default());
         assert_eq!(at(&picture, -0.05), 0.0, "{settings:?}");
         assert!(at(&picture, 0.06) > 0.0, "{settings:?}");

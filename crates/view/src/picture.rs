@@ -13,8 +13,8 @@ use trocar_render::RenderSettings;
 use trocar_sensors::CameraRig;
 use trocar_task::Episode;
 
-/// Paths per pixel of the best quality.
-const SAMPLES: u32 = 32;
+/// Paths per pixel of the best quality, whose noise is filtered out.
+const SAMPLES: u32 = 16;
 
 /// The cameras of an episode, made with the first picture.
 #[derive(Default)]
@@ -45,7 +45,7 @@ impl Pictures {
         let settings = match quality {
             Quality::Raster => RenderSettings::preview(),
             Quality::Ray => RenderSettings::Traced { shadows: true },
-            Quality::Path => RenderSettings::path(SAMPLES),
+            Quality::Path => RenderSettings::denoised(SAMPLES),
         };
         let work = move || {
             let made = rig

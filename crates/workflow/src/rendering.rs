@@ -47,6 +47,8 @@ pub struct Rendering {
     pub size: Option<[usize; 2]>,
     /// Paths per pixel; `None` renders direct light only.
     pub samples: Option<u32>,
+    /// Filters the noise of paths out.
+    pub denoise: bool,
     /// Also write depth.
     pub depth: bool,
     /// Also write labels.
@@ -195,7 +197,8 @@ impl Rendering {
     }
 
     fn settings(&self) -> RenderSettings {
-        self.samples.map_or_else(RenderSettings::preview, RenderSettings::path)
+        let of = if self.denoise { RenderSettings::denoised } else { RenderSettings::path };
+        self.samples.map_or_else(RenderSettings::preview, of)
     }
 
     /// The factor of the rendered size. Direct light has one ray per pixel, so it is rendered at
@@ -346,6 +349,7 @@ impl Rendering {
             time_s,
             frames: 1,
             samples: self.samples.unwrap_or(0),
+            denoised: self.denoise,
             triangles: rig.triangles(),
             render_s,
             seen: visible_objects(rig, labels),

@@ -21,6 +21,9 @@ pub struct Render {
     /// Paths per pixel; 64 by default.
     #[arg(long, requires = "path")]
     pub samples: Option<u32>,
+    /// Filter the noise of the paths out; 16 paths are then the default.
+    #[arg(long, requires = "path")]
+    pub denoise: bool,
     /// Width and height (px), each 8 to 8192, such as 1280x720; by default those of the camera, and
     /// for videos at most 360 px high.
     #[arg(long, value_name = "WxH", value_parser = size)]

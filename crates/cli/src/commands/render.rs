@@ -5,15 +5,18 @@ use crate::output;
 use trocar_core::Progress;
 use trocar_workflow::{Rendered, Rendering, Result, counted};
 
-/// Default number of paths per pixel.
+/// Default number of paths per pixel, and that of pictures whose noise is filtered out.
 const SAMPLES: u32 = 64;
+const DENOISED_SAMPLES: u32 = 16;
 
 pub fn run(arguments: &Render, json: bool, progress: &dyn Progress) -> Result<()> {
+    let samples = if arguments.denoise { DENOISED_SAMPLES } else { SAMPLES };
     let rendering = Rendering {
         source: arguments.source.clone(),
         camera: arguments.camera.clone(),
         size: arguments.size,
-        samples: arguments.path.then(|| arguments.samples.unwrap_or(SAMPLES)),
+        samples: arguments.path.then(|| arguments.samples.unwrap_or(samples)),
+        denoise: arguments.denoise,
         depth: arguments.depth,
         labels: arguments.labels,
         at: arguments.at,
@@ -30,7 +33,8 @@ pub fn run(arguments: &Render, json: bool, progress: &dyn Progress) -> Result<()
 fn text(r: &Rendered) -> String {
     let seen: Vec<String> = r.seen.iter().map(|s| format!("{} {:.1}%", s.name, 1e2 * s.share)).collect();
     let how = if r.samples > 0 {
-        format!("{} per pixel", counted(r.samples as usize, "path"))
+        let filtered = if r.denoised { ", noise filtered out" } else { "" };
+        format!("{} per pixel{filtered}", counted(r.samples as usize, "path"))
     } else {
         "direct light".to_owned()
     };

@@ -19,6 +19,8 @@ pub struct Rendered {
     pub frames: usize,
     /// Paths per pixel; 0 for direct light only.
     pub samples: u32,
+    /// Whether their noise was filtered out.
+    pub denoised: bool,
     /// Number of triangles of the scene.
     pub triangles: usize,
     /// Wall time of rendering (s).

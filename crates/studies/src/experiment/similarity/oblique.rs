@@ -57,7 +57,7 @@ pub(super) fn record(from: &Path, to: &Path, samples: u32, progress: &dyn Progre
             progress.end();
             return Err(e);
         }
-        let settings = RenderSettings::Path { samples, bounces: 4, seed: frame };
+        let settings = RenderSettings::Path { samples, bounces: 4, seed: frame, denoise: false };
         let noise = Noise { shot: 0.01, read: 0.004, seed: 5, frame };
         let film = Film { noise: Some(noise), ..Film::endoscope() };
         let picture = render(&mut stage, &eye, &pose, &settings, &film);

@@ -106,7 +106,7 @@ impl Scenery {
                 outer: PI,
             }),
         }
-        let settings = RenderSettings::Path { samples, bounces: 3, seed: 1 };
+        let settings = RenderSettings::Path { samples, bounces: 3, seed: 1, denoise: false };
         Ok(render(&mut stage, &RayGenerator::new(*camera), &Pose::IDENTITY, &settings, &Film::default()).color)
     }
 
@@ -115,7 +115,7 @@ impl Scenery {
     pub fn through_endoscope(&self, camera: &Camera, pose: &Pose, white_at: f64, samples: u32) -> Result<ColorImage> {
         let mut stage = self.stage(true)?;
         stage.lights.push(Light::endoscope(pose, BESIDE_LENS, white_at));
-        let settings = RenderSettings::Path { samples, bounces: 4, seed: 1 };
+        let settings = RenderSettings::Path { samples, bounces: 4, seed: 1, denoise: false };
         Ok(render(&mut stage, &RayGenerator::new(*camera), pose, &settings, &Film::endoscope()).color)
     }
 
