@@ -5,10 +5,10 @@ use crate::{Error, Result};
 use glam::DVec3;
 use trocar_geometry::{OrganAxis, TetQuality};
 use trocar_scene::TOUGHNESS;
-use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen};
+use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen, Threads};
 use trocar_tissue::{
     Backend, BodyContact, BodyDescription, Collider, ConstitutiveModel, Event, Load, Material, Model, ModelBuilder,
-    SolverSettings, State, Stepper, Support, SupportField, ToolContact, ToolForce, ToolMotion, pins,
+    SolverSettings, State, Stepper, Support, SupportField, Tether, ToolContact, ToolForce, ToolMotion, pins,
 };
 
 /// Length of a frame (s).
@@ -25,6 +25,9 @@ const SUPPORT_FRICTION: f64 = 0.6;
 /// With this value the organs of all phantoms come to rest within a second, and the time constant
 /// stays far below the second that a lift takes.
 pub const VISCOSITY_TIME: f64 = 0.006;
+
+/// Distance between the threads of an organ along it (m), or its median edge if that is longer.
+const THREAD_SPACING: f64 = 2e-3;
 
 /// Cell size of the supports over the organ's median edge: as fine as the nodes that lie on them.
 const SUPPORT_CELL: f64 = 0.5;
@@ -151,6 +154,7 @@ impl World {
                 pinned: pinned_nodes(organ, &axis, up),
                 supports: bed.map(|friction| support_under(organ, up, friction)).transpose()?.into_iter().collect(),
             })?;
+            builder.tethers(k, &tethers_of(organ, &axis, up))?;
             axes.push(axis);
         }
         for [a, b] in &surroundings.filtered {
@@ -247,6 +251,25 @@ impl World {
 fn support_under(organ: &Organ, up: DVec3, friction: f64) -> Result<Support> {
     let cell = SUPPORT_CELL * TetQuality::of(&organ.body).median_edge;
     Ok(SupportField::under(&organ.body, up, cell, friction)?.into())
+}
+
+/// The threads that hold an organ: from the lowest nodes of the part that they hold to where these
+/// were recorded.
+fn tethers_of(organ: &Organ, axis: &OrganAxis, up: DVec3) -> Vec<Tether> {
+    let Some(Threads { from, to, slack_m, stiffness_n_m2 }) = organ.threads else { return Vec::new() };
+    let nodes = &organ.body.vertices;
+    let spacing = THREAD_SPACING.max(TetQuality::of(&organ.body).median_edge) / axis.length;
+    // Only free nodes of the surface have a place.
+    let mut s = vec![f64::NAN; nodes.len()];
+    organ.body.boundary().1.iter().for_each(|i| s[*i as usize] = axis.s[*i as usize]);
+    pinned_nodes(organ, axis, up).iter().for_each(|i| s[*i as usize] = f64::NAN);
+    let thread = |(node, step): (u32, f64)| Tether {
+        node,
+        anchor: nodes[node as usize],
+        length: slack_m,
+        stiffness: stiffness_n_m2 * step * axis.length,
+    };
+    pins::lowest_along(nodes, &s, up, [from, to], spacing).into_iter().map(thread).collect()
 }
 
 /// The tissue of an organ.

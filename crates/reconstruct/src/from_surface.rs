@@ -55,6 +55,8 @@ fn make(path: &Path, unit: Unit, settings: &Settings, progress: &dyn Progress) -
         surface,
         material: Material::default(),
         pins: Pins::Band { share: 0.42 },
+        threads: None,
+        posterior: None,
         facts,
     };
     let mut settings = settings.list();

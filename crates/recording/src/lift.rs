@@ -15,12 +15,19 @@ pub struct LiftInfo {
     pub last: usize,
     /// A pixel (u, v) of the frame `rest` on the organ that is lifted.
     pub click: [f64; 2],
+    /// Force with which the instrument lifts the tissue at the top, in the camera's axes (N), if it
+    /// was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_n: Option<[f64; 3]>,
 }
 
 impl LiftInfo {
     /// Checks the lift without its recording's frames.
     pub(crate) fn validate(&self, camera: Option<&Camera>) -> Result<(), String> {
-        let Self { rest, first, last, click: [u, v] } = *self;
+        let Self { rest, first, last, click: [u, v], force_n } = *self;
+        if let Some(force) = force_n.filter(|f| !f.iter().all(|n| n.abs() <= 100.0)) {
+            return Err(format!("force_n is {force:?}; it must have three numbers of at most 100 N"));
+        }
         if first < rest {
             return Err(format!("first is {first}; it must not be before rest, which is frame {rest}"));
         }
@@ -67,7 +74,7 @@ mod tests {
     use super::*;
 
     fn lift() -> LiftInfo {
-        LiftInfo { rest: 5, first: 20, last: 60, click: [100.0, 50.0] }
+        LiftInfo { rest: 5, first: 20, last: 60, click: [100.0, 50.0], force_n: None }
     }
 
     #[test]

@@ -292,7 +292,7 @@ fn damaged_lifts_name_file_and_field() {
     let root = tempfile::tempdir().unwrap();
     let dir = root.path().join("recording");
     let mut info = info();
-    info.lifts = vec![LiftInfo { rest: 0, first: 1, last: 2, click: [80.0, 60.0] }];
+    info.lifts = vec![LiftInfo { rest: 0, first: 1, last: 2, click: [80.0, 60.0], force_n: None }];
     write(&dir, &info, 3);
     assert_eq!(Recording::open(&dir).unwrap().info.lifts, info.lifts);
     let toml = dir.join("recording.toml");

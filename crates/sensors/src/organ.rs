@@ -221,6 +221,8 @@ mod tests {
             surface,
             material: Material::default(),
             pins: Pins::None,
+            threads: None,
+            posterior: None,
             facts: OrganFacts::default(),
         };
         let whole = OrganSkin::new(&organ);

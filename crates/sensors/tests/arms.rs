@@ -38,6 +38,8 @@ fn specimen() -> Specimen {
         surface,
         material: Material::default(),
         pins: Pins::Band { share: 0.4 },
+        threads: None,
+        posterior: None,
         facts: OrganFacts::default(),
     };
     Specimen {

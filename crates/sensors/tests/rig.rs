@@ -43,6 +43,8 @@ fn bar(name: &str, middle: DVec3, cubes: usize, edge: f64) -> Organ {
         surface,
         material: Material::default(),
         pins: Pins::Band { share: 0.4 },
+        threads: None,
+        posterior: None,
         facts: OrganFacts::default(),
     }
 }

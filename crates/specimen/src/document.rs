@@ -1,7 +1,9 @@
 //! The contents of `specimen.toml`.
 
 use crate::organ::{Material, Organ, OrganFacts, Pins, check_name};
+use crate::posterior::Posterior;
 use crate::specimen::{Provenance, Specimen};
+use crate::threads::Threads;
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use trocar_camera::Camera;
@@ -39,7 +41,11 @@ pub struct OrganEntry {
     base_m: [f64; 3],
     material: Material,
     pins: Pins,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    threads: Option<Threads>,
     facts: OrganFacts,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    posterior: Option<Posterior>,
 }
 
 impl Document {
@@ -51,6 +57,8 @@ impl Document {
             base_m: o.base.into(),
             material: o.material,
             pins: o.pins,
+            threads: o.threads,
+            posterior: o.posterior.clone(),
             facts: o.facts,
         };
         Self {
@@ -95,6 +103,12 @@ impl Document {
             }
             organ.material.validate().map_err(|r| field(format!("material.{r}")))?;
             organ.pins.validate().map_err(|r| field(format!("pins.{r}")))?;
+            if let Some(threads) = &organ.threads {
+                threads.validate().map_err(|r| field(format!("threads.{r}")))?;
+            }
+            if let Some(posterior) = &organ.posterior {
+                posterior.validate().map_err(|r| field(format!("posterior.{r}")))?;
+            }
         }
         Ok(())
     }
@@ -124,6 +138,8 @@ impl OrganEntry {
             surface,
             material: self.material,
             pins: self.pins,
+            threads: self.threads,
+            posterior: self.posterior.clone(),
             base: self.base_m.into(),
             facts: self.facts,
         }

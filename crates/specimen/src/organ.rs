@@ -1,5 +1,6 @@
 //! One organ: meshes, material, pins.
 
+use crate::{Posterior, Threads};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use trocar_geometry::{TetMesh, TriMesh};
@@ -128,6 +129,10 @@ pub struct Organ {
     pub material: Material,
     /// Pins.
     pub pins: Pins,
+    /// Threads that hold it besides, if there are any.
+    pub threads: Option<Threads>,
+    /// What lifts tell about it.
+    pub posterior: Option<Posterior>,
     /// A point nearer to the organ's base (s = 0) than to its tip (m).
     pub base: DVec3,
     /// Measurements.

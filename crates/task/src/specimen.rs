@@ -1,10 +1,10 @@
 //! The hash by which a replay identifies a specimen.
 
-use trocar_specimen::{End, MaterialModel, Pins, Specimen};
+use trocar_specimen::{End, MaterialModel, Pins, Specimen, Threads};
 use xxhash_rust::xxh3::Xxh3;
 
-/// xxh3 of the simulated parts of a specimen: names, meshes, bases, materials, pins and the upward
-/// direction. Colours, facts and origin do not count.
+/// xxh3 of the simulated parts of a specimen: names, meshes, bases, materials, pins,
+/// threads and the upward direction. Colours, facts and origin do not count.
 pub fn specimen_hash(specimen: &Specimen) -> u64 {
     let mut hash = Xxh3::new();
     let numbers = |hash: &mut Xxh3, all: &[f64]| all.iter().for_each(|x| hash.update(&x.to_bits().to_le_bytes()));
@@ -33,6 +33,10 @@ pub fn specimen_hash(specimen: &Specimen) -> u64 {
             }
         };
         numbers(&mut hash, &pins);
+        // Nothing without threads: hashes in episodes that were recorded before stay valid.
+        if let Some(Threads { from, to, slack_m, stiffness_n_m2 }) = organ.threads {
+            numbers(&mut hash, &[from, to, slack_m, stiffness_n_m2]);
+        }
     }
     hash.digest()
 }

@@ -47,6 +47,8 @@ pub fn meshed(pins: Pins, edge: f64) -> Specimen {
             material: Material::default(),
             pins,
             base: -HALF_LENGTH * DVec3::X,
+            threads: None,
+            posterior: None,
             facts: OrganFacts { nodes: body.vertices.len(), inverted: quality.inverted, ..OrganFacts::default() },
             body,
         }],

@@ -12,7 +12,7 @@ use crate::body::surface::Surface;
 use crate::body::{BodyData, Corner, Edge, Vertex};
 use crate::{
     Backend, Body, BodyContact, Collider, ConstitutiveModel, Error, Material, Model, Result, StableNeoHookean, Support,
-    ToolContact,
+    Tether, ToolContact,
 };
 pub(crate) use embed::embed;
 use glam::{DVec3, Vec3A};
@@ -190,6 +190,34 @@ impl ModelBuilder {
         Ok(self.bodies.len() - 1)
     }
 
+    /// Adds threads that hold nodes of the body at `index`. Integrators from outside this crate
+    /// ([`crate::Integrator`]) and [`crate::Batch`] ignore them.
+    ///
+    /// # Errors
+    /// The error names the body and the node. Refused are bodies that have not been added, nodes
+    /// that are pinned or not on the surface, and lengths and stiffnesses out of range.
+    pub fn tethers(&mut self, index: usize, tethers: &[Tether]) -> Result<()> {
+        let bodies = self.bodies.len();
+        let Some(body) = self.bodies.get_mut(index) else {
+            return Err(Error::Model(format!("threads are to hold body {index}; there are {bodies} so far")));
+        };
+        let surface = body.surface_vertices();
+        for tether in tethers {
+            let vertex = body.internal.get(tether.node as usize);
+            let reason = match vertex {
+                Some(vertex) if surface.binary_search(vertex).is_ok() => tether.check().err(),
+                _ => Some(format!("a thread holds node {}; it must be a free node of the surface", tether.node)),
+            };
+            if let Some(reason) = reason {
+                return Err(Error::Body { body: body.name.clone(), reason });
+            }
+        }
+        if !tethers.is_empty() {
+            body.tethers.extend_from_slice(tethers);
+        }
+        Ok(())
+    }
+
     /// Makes the bodies touch each other, except for filtered pairs. Without it they pass through
     /// each other. Integrators from outside this crate ([`crate::Integrator`]) ignore it.
     pub fn body_contact(mut self, contact: BodyContact) -> Self {
@@ -339,6 +367,7 @@ pub(crate) fn lay_out(description: BodyDescription<'_>, contact_stiffness: f64, 
     let mut body = BodyData {
         material,
         supports,
+        tethers: Vec::new(),
         contact_stiffness,
         raised_masses,
         parts: count_parts(&neighbours),

@@ -98,4 +98,4 @@ pub use report::{Divergence, SPEED_LIMIT, StepReport};
 pub use settings::{Descent, QuasiNewton, SolverSettings, Start};
 pub use state::{BodyMotion, State};
 pub use stepper::Stepper;
-pub use support::{Support, SupportContact, SupportField, SupportPlane};
+pub use support::{Support, SupportContact, SupportField, SupportPlane, Tether};

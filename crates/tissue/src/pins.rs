@@ -33,6 +33,23 @@ pub fn end(
     chosen
 }
 
+/// The lowest node along `up` of each of the slices that divide a part of a tubular organ, with the
+/// slice's length in the organ coordinate: where the threads of a sheet below it begin.
+///
+/// `s` is the organ coordinate of each node, the part is from `from` to `to`, and slices are as long
+/// as `longest` at most. Slices without nodes have none.
+pub fn lowest_along(nodes: &[DVec3], s: &[f64], up: DVec3, [from, to]: [f64; 2], longest: f64) -> Vec<(u32, f64)> {
+    let count = ((to - from) / longest).ceil().max(1.0) as usize;
+    let step = (to - from) / count as f64;
+    let lowest = |k: usize| {
+        let (low, high) = (from + k as f64 * step, from + (k + 1) as f64 * step);
+        let slice = (0..nodes.len()).filter(|i| s[*i] >= low && s[*i] <= high);
+        let node = slice.min_by(|a, b| nodes[*a].dot(up).total_cmp(&nodes[*b].dot(up)))?;
+        Some((node as u32, step))
+    };
+    (0..count).filter_map(lowest).collect()
+}
+
 fn lowest(candidates: &mut [u32], nodes: &[DVec3], up: DVec3, share: f64) -> Vec<u32> {
     let height = |i: u32| nodes[i as usize].dot(up);
     candidates.sort_by(|a, b| height(*a).total_cmp(&height(*b)).then(a.cmp(b)));
@@ -56,6 +73,14 @@ mod tests {
         assert_eq!(lowest_band(&column(), -DVec3::Z, 0.2), [0, 1]);
         assert!(lowest_band(&column(), DVec3::Z, 0.0).is_empty());
         assert_eq!(lowest_band(&column(), DVec3::Z, 1.0).len(), 10);
+    }
+
+    #[test]
+    fn each_slice_has_its_lowest_node() {
+        let s: Vec<f64> = (0..10).map(|i| i as f64 / 9.0).collect();
+        let found = lowest_along(&column(), &s, DVec3::Z, [0.5, 1.0], 0.3);
+        assert_eq!(found, [(6, 0.25), (9, 0.25)]);
+        assert_eq!(lowest_along(&column(), &s, DVec3::Z, [0.92, 0.97], 0.3), []);
     }
 
     #[test]

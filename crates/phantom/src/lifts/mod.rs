@@ -13,7 +13,7 @@ mod truth;
 #[cfg(test)]
 mod tests;
 
-pub use support::{HiddenSupport, Threads};
+pub use support::HiddenSupport;
 pub use truth::{LIFTS_FILE, LiftTruth, LiftsTruth};
 
 use crate::anatomy::Anatomy;
@@ -126,6 +126,7 @@ impl<'a> Lifts<'a> {
                 first: first + script::FIRST,
                 last: first + script::FRAMES - 1,
                 click: self.click,
+                force_n: None,
             }
         };
         (0..self.scripts.len()).map(lift).collect()

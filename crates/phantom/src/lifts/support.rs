@@ -3,6 +3,8 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use trocar_geometry::{OrganAxis, TetMesh};
+use trocar_specimen::Threads;
+use trocar_tissue::pins;
 use trocar_tissue_reference::Tether;
 
 /// Share of the organ's length at its base that does not move.
@@ -19,19 +21,6 @@ pub enum HiddenSupport {
     Mesentery,
     /// The base, and a short adhesion at the tip.
     Adhesion,
-}
-
-/// The threads of a [`HiddenSupport`] over a part of the organ.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Threads {
-    /// First organ coordinate that they hold.
-    pub from: f64,
-    /// Last organ coordinate that they hold.
-    pub to: f64,
-    /// Length up to which they are slack (m).
-    pub slack_m: f64,
-    /// Their stiffness per length of the organ (N/m2).
-    pub stiffness_n_m2: f64,
 }
 
 impl HiddenSupport {
@@ -65,20 +54,14 @@ impl HiddenSupport {
     /// between two threads along the organ.
     pub(super) fn tethers(self, mesh: &TetMesh, axis: &OrganAxis, up: DVec3, spacing: f64) -> Vec<Tether> {
         let Some(Threads { from, to, slack_m, stiffness_n_m2 }) = self.threads() else { return Vec::new() };
-        let count = ((to - from) * axis.length / spacing).ceil().max(1.0) as usize;
-        let step = (to - from) / count as f64;
-        let lowest = |k: usize| {
-            let (low, high) = (from + k as f64 * step, from + (k + 1) as f64 * step);
-            let nodes = (0..axis.s.len()).filter(|i| axis.s[*i] >= low && axis.s[*i] <= high);
-            nodes.min_by(|a, b| mesh.vertices[*a].dot(up).total_cmp(&mesh.vertices[*b].dot(up)))
-        };
-        let tether = |node: usize| Tether {
+        let thread = |(node, step): (u32, f64)| Tether {
             body: 0,
-            node: node as u32,
-            anchor: mesh.vertices[node],
+            node,
+            anchor: mesh.vertices[node as usize],
             length: slack_m,
             stiffness: stiffness_n_m2 * step * axis.length,
         };
-        (0..count).filter_map(lowest).map(tether).collect()
+        let along = pins::lowest_along(&mesh.vertices, &axis.s, up, [from, to], spacing / axis.length);
+        along.into_iter().map(thread).collect()
     }
 }

@@ -7,14 +7,14 @@
 //! truth/lift-0/centreline.csv     frame, place along the organ, centreline, front above it (m)
 //! ```
 
-use super::support::{HiddenSupport, Threads};
+use super::support::HiddenSupport;
 use crate::{Error, Result};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use trocar_geometry::TriMesh;
 use trocar_geometry::io::{Unit, read_surface, write_ply};
-use trocar_specimen::read_toml;
+use trocar_specimen::{Threads, read_toml};
 
 /// The file that lists the lifts, within the folder `truth/`.
 pub const LIFTS_FILE: &str = "lifts.toml";

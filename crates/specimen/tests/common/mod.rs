@@ -19,6 +19,8 @@ pub fn specimen() -> Specimen {
         material: Material { model: MaterialModel::StVenantKirchhoff, ..Material::default() },
         pins,
         base: DVec3::new(0.1, 1.0 / 3.0, -2e-7),
+        threads: None,
+        posterior: None,
         facts: OrganFacts { nodes: 4, tets: 1, depth_error_median_mm: Some(0.7), ..OrganFacts::default() },
     };
     Specimen {

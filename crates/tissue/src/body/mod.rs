@@ -14,7 +14,7 @@ pub(crate) mod surface;
 pub(crate) mod tree;
 mod vertex;
 
-use crate::{LatticeSettings, Material, Support};
+use crate::{LatticeSettings, Material, Support, Tether};
 use element_lanes::ElementLanes;
 pub(crate) use embedding::{Embedding, EmbeddingData};
 use glam::{DVec3, Vec3A};
@@ -38,6 +38,8 @@ pub struct BodyData {
     pub(crate) raised_masses: usize,
     pub(crate) parts: usize,
     pub(crate) supports: Vec<Support>,
+    /// Threads that hold it.
+    pub(crate) tethers: Vec<Tether>,
     /// Stiffness of contacts over Young's modulus times a node's size.
     pub(crate) contact_stiffness: f64,
     /// Rest shape in the original node order (m).
@@ -110,6 +112,7 @@ impl Body {
                 && self.material == other.material
                 && self.pinned == other.pinned
                 && self.supports == other.supports
+                && self.tethers == other.tethers
                 && self.contact_stiffness == other.contact_stiffness
                 && self.lattice_settings() == other.lattice_settings()
                 && self.vertices.iter().map(|v| v.mass).eq(other.vertices.iter().map(|v| v.mass)))
@@ -144,6 +147,11 @@ impl Body {
     /// Surfaces that it rests on.
     pub fn supports(&self) -> &[Support] {
         &self.supports
+    }
+
+    /// Threads that hold it.
+    pub fn tethers(&self) -> &[Tether] {
+        &self.tethers
     }
 
     /// Number of nodes.

@@ -11,6 +11,7 @@ use super::force::ToolForce;
 use super::hole_vertices::HoleVertices;
 use super::local_support::LocalSupport;
 use super::site::Site;
+use super::taut::LocalTether;
 use super::tool_placement::{self, Placed};
 use crate::frame::Frame;
 use crate::state::{Anchor, BodyState, Source};
@@ -29,6 +30,8 @@ const MAX_CHANGED_CONTACTS: usize = 8;
 /// The contacts of one body.
 pub(crate) struct ContactSet {
     supports: Vec<LocalSupport>,
+    /// By vertex.
+    tethers: Vec<LocalTether>,
     /// Free vertices of the body's surface, ascending.
     surface: Vec<u32>,
     /// Vertices that may touch something in this frame or hang on a tool, ascending.
@@ -69,6 +72,7 @@ impl ContactSet {
         let surface = body.surface_vertices();
         Self {
             supports: LocalSupport::of(body),
+            tethers: LocalTether::of(body),
             near: Vec::with_capacity(body.len()),
             compliant: Vec::with_capacity(body.len()),
             contacts: Vec::with_capacity(2 * surface.len()),
@@ -106,7 +110,7 @@ impl ContactSet {
         // Room for all contacts that a substep may have, so that only the first one allocates.
         self.contacts.clear();
         self.places.clear();
-        let most = (self.supports.len() + frame.colliders.len()) * self.surface.len() + body.len();
+        let most = (self.supports.len() + frame.colliders.len()) * self.surface.len() + body.len() + self.tethers.len();
         self.contacts.reserve(most);
         self.places.reserve(most);
         let anchors = 2 * self.surface.len();
@@ -139,6 +143,7 @@ impl ContactSet {
         let drop = if loose { dt * dt * frame.gravity.as_vec3a() } else { Vec3A::ZERO };
         let (mut touching, mut changed) = (0, 0);
         let mut hanging = self.compliant.iter().map(|h| h.vertex).peekable();
+        let mut tethered = self.tethers.iter().map(|t| t.vertex).peekable();
         for k in 0..self.surface.len() {
             let vertex = self.surface[k];
             let i = vertex as usize;
@@ -146,7 +151,11 @@ impl ContactSet {
                 self.near.push(before);
             }
             let hangs = hanging.next_if_eq(&vertex).is_some();
-            let (mut near, mut touches) = (hangs, false);
+            let mut near = hangs;
+            while tethered.next_if(|t| *t <= vertex).is_some_and(|t| t == vertex) {
+                near = true;
+            }
+            let mut touches = false;
             if !self.fixed[i] {
                 let (x, ahead) = (state.x[i], state.x[i] + dt * state.v[i] + drop);
                 self.for_sources(frame, body, i, x, |_, height, normal, point, _, _| {
@@ -235,6 +244,7 @@ impl ContactSet {
         self.first.fill(0);
         let mut anchor = 0;
         let mut hanging = self.compliant.iter().peekable();
+        let mut tethered = self.tethers.iter().peekable();
         for vertex in &self.near {
             let i = *vertex as usize;
             let begin = contacts.len();
@@ -263,7 +273,7 @@ impl ContactSet {
                             Some(placed) if placed.grips => 0.0,
                             _ => frame.colliders[c as usize].friction as f32,
                         },
-                        Source::Body(_) | Source::Grasp(..) => 0.0,
+                        Source::Body(_) | Source::Grasp(..) | Source::Tether(_) => 0.0,
                     };
                     contacts.push(Contact {
                         site: Site::vertex(*vertex),
@@ -286,6 +296,13 @@ impl ContactSet {
             {
                 contacts.push(contact);
                 places.push(held.slid);
+            }
+            while let Some(tether) = tethered.next_if(|t| t.vertex <= *vertex) {
+                let taut = (tether.vertex == *vertex && !self.fixed[i]).then(|| tether.contact(x(i), self.reach));
+                if let Some(contact) = taut.flatten() {
+                    contacts.push(contact);
+                    places.push(contact.place);
+                }
             }
             self.first[i] = begin as u32 | MARK;
         }
@@ -310,7 +327,7 @@ impl ContactSet {
                 Some(placed) => (placed.to.transform(place.as_dvec3()) - body.origin).as_vec3a(),
                 None => place,
             },
-            Source::Support(_) | Source::Body(_) | Source::Grasp(..) => place,
+            Source::Support(_) | Source::Body(_) | Source::Grasp(..) | Source::Tether(_) => place,
         }
     }
 
@@ -397,7 +414,10 @@ impl ContactSet {
         let pressed = if state.warm.supported[vertex] { body.vertices[vertex].contact_stiffness } else { 0.0 };
         let held = self.compliant.binary_search_by_key(&(vertex as u32), |h| h.vertex);
         let hangs = held.ok().and_then(|h| frame.grasps[self.compliant[h].grasp as usize].compliance);
-        pressed + hangs.map_or(0.0, |c| c.stiffness as f32)
+        let first = self.tethers.partition_point(|t| (t.vertex as usize) < vertex);
+        let tethers = self.tethers[first..].iter().take_while(|t| t.vertex as usize == vertex);
+        let pressed = pressed + hangs.map_or(0.0, |c| c.stiffness as f32);
+        tethers.fold(pressed, |sum, t| sum + t.stiffness)
     }
 
     /// Ends a substep with the vertices at `x`: anchors follow what slips, and tools feel the
@@ -424,6 +444,9 @@ impl ContactSet {
                 continue;
             }
             let Some(push) = push else { continue };
+            if let Source::Tether(_) = contact.source {
+                continue;
+            }
             // A vertex that sticks keeps its anchor to the bit.
             let place = match (contact.slide(here), contact.source) {
                 (None, _) => *place,

@@ -18,6 +18,7 @@ pub(crate) mod proximity;
 mod proximity_tests;
 mod reaction;
 mod site;
+mod taut;
 mod tool_features;
 #[cfg(test)]
 mod tool_features_tests;

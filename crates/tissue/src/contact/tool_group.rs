@@ -25,7 +25,7 @@ impl ToolGroup<'_> {
         let tool = match source {
             Source::Collider(c) => self.colliders.get(c as usize).map(|collider| collider.tool),
             Source::Grasp(g, _) => self.grasps.get(g as usize).map(|grasp| grasp.tool),
-            Source::Support(_) | Source::Body(_) => None,
+            Source::Support(_) | Source::Body(_) | Source::Tether(_) => None,
         };
         tool.is_some_and(|tool| self.tools.contains(&tool))
     }

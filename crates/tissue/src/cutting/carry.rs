@@ -5,7 +5,7 @@ use super::split::{Split, parts};
 use super::{Piece, Severed};
 use crate::builder::{Inherited, NodeMasses, embed, lay_out};
 use crate::state::{Anchor, BodyState, WarmStart};
-use crate::{Backend, Body, BodyDescription, Compliance, Grasp, Hole, Model, Result, State};
+use crate::{Backend, Body, BodyDescription, Compliance, Grasp, Hole, Model, Result, State, Tether};
 use trocar_geometry::TetMesh;
 
 /// A mass this many times the weight of the volume around a node was raised to the floor; less is
@@ -44,11 +44,15 @@ pub(super) fn carry(model: &Model, state: &State, index: usize, split: &Split) -
             masses: nodes.iter().map(|i| masses.of[*i as usize]).collect(),
             raised: nodes.iter().filter(|i| masses.raised[split.parent[**i as usize] as usize]).count(),
         };
+        // A node that fell apart leaves its threads to the first of its copies.
+        let threads = |t: &Tether| Some(Tether { node: nodes.binary_search(&t.node).ok()? as u32, ..*t });
+        let tethers = whole.tethers.iter().filter_map(threads).collect();
         let nodes: Vec<u32> = nodes.iter().map(|i| split.parent[*i as usize]).collect();
         let pinned = (0..nodes.len() as u32).filter(|k| whole.pinned[nodes[*k as usize] as usize]).collect();
         let (material, supports) = (whole.material, whole.supports.clone());
         let description = BodyDescription { name, mesh: &mesh, material, pinned, supports };
         let mut body = lay_out(description, whole.contact_stiffness, NodeMasses::Inherited(inherited));
+        body.tethers = tethers;
         if let Backend::Lattice(settings) = model.backend {
             body.lattice = embed(&body, settings)?;
         }

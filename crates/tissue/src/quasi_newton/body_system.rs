@@ -13,7 +13,6 @@ use crate::frame::Frame;
 use crate::lanes::{Row, dot_rows};
 use crate::settings::{Descent, QuasiNewton, Start};
 use crate::state::BodyState;
-use crate::state::Source;
 use crate::threads::in_parts;
 use crate::{Body, Isa};
 use fearless_simd::{Level, SimdBase, dispatch, f32x4};
@@ -186,7 +185,7 @@ impl QuasiNewtonSolver {
         };
         let mut new = false;
         let contacts = self.touching.contacts.list().iter();
-        for contact in contacts.filter(|contact| !matches!(contact.source, Source::Grasp(..))) {
+        for contact in contacts.filter(|contact| !contact.source.is_in_factor()) {
             let presses = |k: usize| contact.height(contact.site.at(|vertex| places(vertex)[k])) < 0.0;
             if !(presses(0) || presses(1)) {
                 continue;

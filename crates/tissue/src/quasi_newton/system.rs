@@ -11,7 +11,6 @@ use super::warp::Warp;
 use crate::Body;
 use crate::contact::ContactSet;
 use crate::lanes::Row;
-use crate::state::Source;
 use fearless_simd::{Level, dispatch};
 use glam::{Mat3A, Vec3A};
 
@@ -136,7 +135,7 @@ impl System {
             return;
         }
         pressing.fill(0.0);
-        for contact in contacts.list().iter().filter(|contact| !matches!(contact.source, Source::Grasp(..))) {
+        for contact in contacts.list().iter().filter(|contact| !contact.source.is_in_factor()) {
             let number = |vertex: u32| layout.number[vertex as usize] as usize;
             let here = contact.site.at(|vertex| position(&x[number(vertex)]));
             if contact.height(here) >= 0.0 {

@@ -94,8 +94,9 @@ impl BodyState {
             let (kind, number) = match source {
                 Source::Support(s) => (0u32, s),
                 Source::Collider(c) => (1, c),
-                // Grasps have no anchors.
+                // Grasps and threads have no anchors.
                 Source::Grasp(g, _) => (2, g),
+                Source::Tether(t) => (4, t),
                 Source::Body(b) => (3, b),
             };
             [*vertex, kind, *number].iter().for_each(|k| hash.update(&k.to_le_bytes()));

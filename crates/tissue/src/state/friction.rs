@@ -13,6 +13,15 @@ pub(crate) enum Source {
     Body(u32),
     /// The grasp of this number, and its node of this number: it holds from both sides.
     Grasp(u32, u32),
+    /// The body's thread of this number.
+    Tether(u32),
+}
+
+impl Source {
+    /// Whether the quasi-Newton solver's factor always has its stiffness.
+    pub fn is_in_factor(self) -> bool {
+        matches!(self, Self::Grasp(..) | Self::Tether(_))
+    }
 }
 
 /// Where friction holds a vertex.

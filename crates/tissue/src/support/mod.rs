@@ -1,8 +1,11 @@
-//! Supports of a body: one-sided surfaces with a quadratic penalty and Coulomb friction.
+//! Supports of a body: one-sided surfaces with a quadratic penalty and Coulomb friction, and threads
+//! that hold it.
 
 mod field;
+mod tether;
 
 pub use field::SupportField;
+pub use tether::Tether;
 
 use glam::{DMat3, DVec3};
 

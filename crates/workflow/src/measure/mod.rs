@@ -126,7 +126,7 @@ impl Measuring {
                 film.organ
             ))
         })?;
-        let info = LiftInfo { rest, first, last, click };
+        let info = LiftInfo { rest, first, last, click, force_n: None };
         progress.begin("lift", (last - rest + 1) as u64);
         let measured = MeasuredLift::of(&mut film, &info, &mask, None, progress);
         progress.end();

@@ -95,6 +95,8 @@ impl Shape {
             material: Material { young_modulus_pa: MODULUS, ..Material::default() },
             pins: Pins::None,
             base: base + height * DVec3::Z,
+            threads: None,
+            posterior: None,
             facts: OrganFacts { nodes: body.vertices.len(), inverted: quality.inverted, ..OrganFacts::default() },
             body,
         };

@@ -1,0 +1,290 @@
+//! Identification: rounds of simulated lifts, each nearer to the measured ones.
+
+use crate::emulator::{Emulator, Foretold};
+use crate::likelihood::Likelihood;
+use crate::lone_organ::{LoneOrgan, Pace};
+use crate::observation::Observation;
+use crate::walkers::walk;
+use crate::{Error, Result};
+use rayon::prelude::*;
+use trocar_core::{Progress, Random};
+use trocar_geometry::Skin;
+use trocar_specimen::{Parameter, Posterior, Prior};
+
+/// Simulated values of the first round, from the prior, and of each further round.
+const FIRST: usize = 96;
+const FURTHER: [usize; 2] = [48, 48];
+
+/// Walkers, and rounds of a walk: before draws are kept, in all, and between kept ones.
+const WALKERS: usize = 32;
+const WALK: [usize; 3] = [250, 650, 8];
+
+/// Fewest landmarks of all lifts.
+const LEAST_LANDMARKS: usize = 6;
+
+/// What to identify, from what.
+#[derive(Clone, Debug)]
+pub struct Identification {
+    /// The organ alone, in the mesh in which it is simulated.
+    pub organ: LoneOrgan,
+    /// The lifts.
+    pub lifts: Vec<Observation>,
+    /// The parameters with their ranges.
+    pub priors: Vec<Prior>,
+    /// Seed of all draws.
+    pub seed: u64,
+    /// Name of the recording, for the posterior.
+    pub recording: String,
+    /// Simulations in parallel; 0 for one a core. The result does not depend on it.
+    pub threads: usize,
+}
+
+/// What was identified.
+#[derive(Clone, Debug)]
+pub struct Identified {
+    /// The posterior.
+    pub posterior: Posterior,
+    /// The values that explain the lifts best, of all simulated ones.
+    pub best: Vec<(Parameter, f64)>,
+    /// Landmark error of these values over the lifts (m).
+    pub rmse: f64,
+    /// Error of the model over the lift: median of the posterior.
+    pub model_error: f64,
+    /// Draws from the posterior, as scores.
+    pub draws: Vec<Vec<f64>>,
+    /// Simulated values, and those of them that diverged.
+    pub simulated: usize,
+    /// See `simulated`.
+    pub diverged: usize,
+}
+
+/// A simulated point: its scores and the numbers of all lifts.
+struct Point {
+    scores: Vec<f64>,
+    numbers: Vec<f64>,
+}
+
+impl Identification {
+    /// Values of scores.
+    pub fn values(&self, scores: &[f64]) -> Vec<(Parameter, f64)> {
+        self.priors.iter().zip(scores).map(|(p, score)| (p.name, p.name.value(p.range, *score))).collect()
+    }
+
+    /// Identifies.
+    ///
+    /// # Errors
+    /// Too few landmarks, an organ that cannot be simulated, an interruption.
+    pub fn run(&self, progress: &dyn Progress) -> Result<Identified> {
+        let landmarks: usize = self.lifts.iter().map(|l| l.landmarks.len()).sum();
+        if landmarks < LEAST_LANDMARKS {
+            return Err(Error::Lifts(format!(
+                "the lifts have {landmarks} landmarks that are seen; there must be at least {LEAST_LANDMARKS}"
+            )));
+        }
+        let total = FIRST + FURTHER.iter().sum::<usize>();
+        progress.begin("simulated lifts", (total * self.lifts.len()) as u64);
+        let result = self.rounds(progress);
+        progress.end();
+        result
+    }
+
+    fn rounds(&self, progress: &dyn Progress) -> Result<Identified> {
+        let random = Random::from_keys(&[self.seed, 401]);
+        let likelihood = Likelihood::of(&self.lifts);
+        let bound: Vec<Skin> = self.lifts.iter().map(|lift| lift.bound(&self.organ)).collect();
+        let mut points: Vec<Point> = Vec::new();
+        let mut asked = self.spread(random.stream(1));
+        let (mut simulated, mut diverged, mut draws) = (0, 0, Vec::new());
+        for round in 0..=FURTHER.len() {
+            simulated += asked.len();
+            let found = self.simulate(&asked, &bound, progress)?;
+            diverged += found.iter().filter(|p| p.is_none()).count();
+            points.extend(found.into_iter().flatten());
+            if points.len() < 2 * self.priors.len() {
+                return Err(Error::Lifts(format!("{diverged} of {simulated} simulated lifts diverged")));
+            }
+            draws = self.explore(&points, &likelihood, random.stream(10 + round as u64))?;
+            if let Some(count) = FURTHER.get(round) {
+                let pick = random.stream(20 + round as u64);
+                let one = |i: usize| ((pick.uniform(i as u64) * draws.len() as f64) as usize).min(draws.len() - 1);
+                asked = (0..*count).map(|i| draws[one(i)][..self.priors.len()].to_vec()).collect();
+            }
+        }
+        self.conclude(&points, &likelihood, draws, [simulated, diverged])
+    }
+
+    /// Points that cover the prior evenly: a Latin hypercube.
+    fn spread(&self, random: Random) -> Vec<Vec<f64>> {
+        let mut points = vec![vec![0.0; self.priors.len()]; FIRST];
+        for k in 0..self.priors.len() {
+            let own = random.stream(k as u64);
+            let mut order: Vec<usize> = (0..FIRST).collect();
+            order.sort_by_key(|i| own.bits(*i as u64));
+            for (i, rank) in order.into_iter().enumerate() {
+                let share = (rank as f64 + own.stream(1).uniform(i as u64)) / FIRST as f64;
+                points[i][k] = normal_quantile(share);
+            }
+        }
+        points
+    }
+
+    /// The numbers of all lifts at these scores; `None` where a lift diverged.
+    fn simulate(&self, asked: &[Vec<f64>], bound: &[Skin], progress: &dyn Progress) -> Result<Vec<Option<Point>>> {
+        let pool = trocar_core::thread_pool(self.threads).map_err(Error::Lifts)?;
+        pool.install(|| asked.par_iter().map(|scores| self.simulate_one(scores, bound, progress)).collect())
+    }
+
+    fn simulate_one(&self, scores: &[f64], bound: &[Skin], progress: &dyn Progress) -> Result<Option<Point>> {
+        let values = self.values(scores);
+        let organ = self.organ.with(|organ| Posterior::apply(&values, organ));
+        let pulls: Vec<_> = self.lifts.iter().map(|lift| lift.pull).collect();
+        let lifted = organ.lift(&pulls, Pace::QUICK, progress)?;
+        progress.advance(self.lifts.len() as u64);
+        let mut numbers = Vec::new();
+        for ((lift, lifted), bound) in self.lifts.iter().zip(&lifted).zip(bound) {
+            let Some(lifted) = lifted else { return Ok(None) };
+            numbers.extend(lift.predicted(&organ, lifted, bound));
+        }
+        Ok(Some(Point { scores: scores.to_vec(), numbers }))
+    }
+
+    /// Draws from the posterior, as far as the simulated points tell it: scores of the parameters
+    /// and of the model's error.
+    fn explore(&self, points: &[Point], likelihood: &Likelihood, random: Random) -> Result<Vec<Vec<f64>>> {
+        let (at, values): (Vec<Vec<f64>>, Vec<Vec<f64>>) =
+            points.iter().map(|p| (p.scores.clone(), p.numbers.clone())).unzip();
+        let emulator =
+            Emulator::through(&at, &values).ok_or_else(|| Error::Lifts("all simulated lifts are alike".to_owned()))?;
+        let log = |scores: &[f64]| {
+            let (parameters, error) = scores.split_at(self.priors.len());
+            let prior: f64 = -0.5 * scores.iter().map(|s| s * s).sum::<f64>();
+            prior + likelihood.log(&emulator.at(parameters), error[0])
+        };
+        // The walkers begin at the best simulated points.
+        let mut ranked: Vec<(f64, &Point)> = points.iter().map(|p| (self.log_at(p, likelihood), p)).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let start = |k: usize| -> Vec<f64> {
+            let own = random.stream(1000 + k as u64);
+            let (_, point) = ranked[k % ranked.len().min(WALKERS / 2)];
+            let jitter = |d: usize| 0.1 * own.normal(d as u64);
+            let scores = point.scores.iter().enumerate().map(|(d, s)| s + jitter(d));
+            scores.chain([0.3 * own.normal(99)]).collect()
+        };
+        Ok(walk((0..WALKERS).map(start).collect(), WALK, random, log))
+    }
+
+    /// Logarithm of the posterior at a simulated point with the likeliest error of the model.
+    fn log_at(&self, point: &Point, likelihood: &Likelihood) -> f64 {
+        let exact = Foretold { mean: point.numbers.clone(), variance: 0.0 };
+        let of = |error: f64| -0.5 * error * error + likelihood.log(&exact, error);
+        let most = (-8..=20).map(|k| of(0.25 * f64::from(k))).fold(f64::NEG_INFINITY, f64::max);
+        most - 0.5 * point.scores.iter().map(|s| s * s).sum::<f64>()
+    }
+
+    fn conclude(
+        &self,
+        points: &[Point],
+        likelihood: &Likelihood,
+        draws: Vec<Vec<f64>>,
+        [simulated, diverged]: [usize; 2],
+    ) -> Result<Identified> {
+        let count = draws.len() as f64;
+        let parameters = 0..self.priors.len();
+        let mean: Vec<f64> = parameters.clone().map(|k| draws.iter().map(|d| d[k]).sum::<f64>() / count).collect();
+        let product = |i: usize, j: usize| draws.iter().map(|d| (d[i] - mean[i]) * (d[j] - mean[j])).sum::<f64>();
+        let covariance = parameters.clone().map(|i| parameters.clone().map(|j| product(i, j) / count).collect());
+        let best = points
+            .iter()
+            .map(|p| (self.log_at(p, likelihood), p))
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, p)| p)
+            .ok_or_else(|| Error::Lifts("no simulated lift is left".to_owned()))?;
+        let rmse = self.rmse(&best.numbers);
+        let mut posterior = Posterior {
+            recording: self.recording.clone(),
+            lifts: self.lifts.iter().map(|l| l.number).collect(),
+            landmark_rmse_mm: 1e3 * rmse,
+            covariance: covariance.collect(),
+            mean,
+            parameters: self.priors.clone(),
+        };
+        posterior.summarise();
+        let errors: Vec<f64> = draws.iter().map(|d| Likelihood::model_error(d[self.priors.len()])).collect();
+        Ok(Identified {
+            posterior,
+            best: self.values(&best.scores),
+            rmse,
+            model_error: trocar_core::median(errors).unwrap_or(f64::NAN),
+            draws: draws.into_iter().map(|d| d[..self.priors.len()].to_vec()).collect(),
+            simulated,
+            diverged,
+        })
+    }
+
+    /// Root mean square of the lifts' landmark errors (m).
+    fn rmse(&self, numbers: &[f64]) -> f64 {
+        let mut next = 0;
+        let squares = self.lifts.iter().map(|lift| {
+            let own = &numbers[next..];
+            next += lift.measured().len();
+            lift.rmse(own).powi(2)
+        });
+        (squares.sum::<f64>() / self.lifts.len().max(1) as f64).sqrt()
+    }
+}
+
+/// The score below which a share of the standard normal distribution lies (P. J. Acklam's rational
+/// approximation, to a relative 1e-9; here for shares within (0, 1)).
+fn normal_quantile(share: f64) -> f64 {
+    const A: [f64; 6] = [
+        -39.696_830_286_653_8,
+        220.946_098_424_521,
+        -275.928_510_446_969,
+        138.357_751_867_269,
+        -30.664_798_066_147_2,
+        2.506_628_277_459_24,
+    ];
+    const B: [f64; 5] = [
+        -54.476_098_798_224_1,
+        161.585_836_858_041,
+        -155.698_979_859_887,
+        66.801_311_887_719_7,
+        -13.280_681_552_885_7,
+    ];
+    const C: [f64; 6] = [
+        -7.784_894_002_430_29e-3,
+        -0.322_396_458_041_136,
+        -2.400_758_277_161_84,
+        -2.549_732_539_343_73,
+        4.374_664_141_464_97,
+        2.938_163_982_698_78,
+    ];
+    const D: [f64; 4] =
+        [7.784_695_709_041_46e-3, 0.322_467_129_070_04, 2.445_134_137_143, 3.754_408_661_907_42];
+    let polynomial = |c: &[f64], x: f64| c.iter().fold(0.0, |sum, c| sum * x + c);
+    let tail = |p: f64| {
+        let q = (-2.0 * p.ln()).sqrt();
+        polynomial(&C, q) / (polynomial(&D, q) * q + 1.0)
+    };
+    let share = share.clamp(1e-9, 1.0 - 1e-9);
+    if share < 0.02425 {
+        tail(share)
+    } else if share > 1.0 - 0.02425 {
+        -tail(1.0 - share)
+    } else {
+        let (q, r) = (share - 0.5, (share - 0.5) * (share - 0.5));
+        polynomial(&A, r) * q / (polynomial(&B, r) * r + 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::normal_quantile;
+
+    #[test]
+    fn quantiles_are_those_of_the_normal_distribution() {
+        for (share, score) in [(0.5, 0.0), (0.95, 1.644_853_6), (0.01, -2.326_347_9), (0.25, -0.674_489_75)] {
+            assert!((normal_quantile(share) - score).abs() < 1e-6, "{share}: {}", normal_quantile(share));
+        }
+    }
+}

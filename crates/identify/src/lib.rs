@@ -1,0 +1,25 @@
+//! What holds an organ, and how stiff it is, from measured grasp-lifts: a posterior.
+//!
+//! A [`LoneOrgan`] is lifted as the measured lifts were ([`SeenLift`], [`Observation`]), with many
+//! values of its [`Parameter`](trocar_specimen::Parameter)s. [`Identification`] finds the values
+//! that explain the lifts, and how well the lifts tell them ([`Identified`]).
+
+mod alignment;
+mod dense;
+mod emulator;
+mod error;
+mod identification;
+mod likelihood;
+mod lone_organ;
+mod observation;
+mod prior;
+mod seen;
+mod walkers;
+
+pub use alignment::Alignment;
+pub use error::{Error, Result};
+pub use identification::{Identification, Identified};
+pub use lone_organ::{Grip, Lifted, LoneOrgan, Pace, Pull};
+pub use observation::{Landmark, Observation};
+pub use prior::default_priors;
+pub use seen::SeenLift;
