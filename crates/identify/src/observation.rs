@@ -50,6 +50,11 @@ impl Observation {
         self.landmarks.iter().map(|l| l.moved).chain(force).flat_map(|d| d.to_array()).collect()
     }
 
+    /// Root mean square error of the landmarks of a simulated lift (m).
+    pub fn error(&self, organ: &LoneOrgan, lifted: &Lifted) -> f64 {
+        self.rmse(&self.predicted(organ, lifted, &self.bound(organ)))
+    }
+
     /// Root mean square error of the landmarks of a prediction (m).
     pub(crate) fn rmse(&self, predicted: &[f64]) -> f64 {
         let count = self.landmarks.len();

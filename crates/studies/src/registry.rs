@@ -6,7 +6,7 @@ use crate::bench::{
 };
 use crate::experiment::{
     BackendsExperiment, BeamExperiment, ContactExperiment, ControllerGridExperiment, ConvergenceExperiment,
-    CutForceExperiment, ElementQualityExperiment, GraspDesignsExperiment, IntegratorsExperiment, LiftsExperiment,
+    CutForceExperiment, ElementQualityExperiment, GraspDesignsExperiment, IdentificationExperiment, IntegratorsExperiment, LiftsExperiment,
     MeshConvergenceExperiment, PortBudgetExperiment, PortRegraspExperiment, RandomActionsExperiment,
     ReconstructionExperiment, RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment,
     TruthCubeExperiment, WrenchExperiment,
@@ -36,6 +36,7 @@ pub static STUDIES: &[&dyn Entry] = &[
     &Of::<BackendsExperiment>::NEW,
     &Of::<SimilarityExperiment>::NEW,
     &Of::<LiftsExperiment>::NEW,
+    &Of::<IdentificationExperiment>::NEW,
     &Of::<MeshingBench>::NEW,
     &Of::<OrgansBench>::NEW,
     &Of::<ScalingBench>::NEW,

@@ -64,6 +64,9 @@ pub enum Error {
     /// A lift cannot be measured.
     #[error(transparent)]
     Measure(trocar_measure::Error),
+    /// Nothing can be identified from lifts.
+    #[error(transparent)]
+    Identify(trocar_identify::Error),
     /// A step of a study failed.
     #[error(transparent)]
     Study(Box<dyn std::error::Error + Send + Sync>),
@@ -143,6 +146,16 @@ impl From<trocar_measure::Error> for Error {
         match error {
             trocar_measure::Error::Interrupted => Self::Interrupted,
             other => Self::Measure(other),
+        }
+    }
+}
+
+/// Keeps interruptions apart from other errors.
+impl From<trocar_identify::Error> for Error {
+    fn from(error: trocar_identify::Error) -> Self {
+        match error {
+            trocar_identify::Error::Interrupted => Self::Interrupted,
+            other => Self::Identify(other),
         }
     }
 }

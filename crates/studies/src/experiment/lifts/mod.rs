@@ -2,9 +2,10 @@
 //! lifts of a phantom whose tissue is another than the simulated one are measured, reproduced and
 //! compared.
 
+mod identified;
 mod page;
 mod result;
-mod simulated;
+mod support;
 
 pub use result::LiftsResult;
 
@@ -14,10 +15,12 @@ use crate::trials::Outcomes;
 use crate::{Error, Result};
 use clap::Args;
 use glam::DVec3;
-use result::{SimulatedRow, errors, residual, trend};
-use simulated::{Appendix, Support, aligned};
+use identified::identified;
+use result::{IdentifiedSummary, SimulatedRow, errors, residual, trend};
+use support::Support;
 use trocar_core::Progress;
-use trocar_measure::{MeasuredLift, chamfer, normalised};
+use trocar_identify::{Grip, LoneOrgan, Pace, Pull, SeenLift};
+use trocar_measure::normalised;
 use trocar_phantom::{LiftOptions, RecordOptions, Sensor};
 use trocar_recording::Recording;
 use trocar_report::document::Document;
@@ -64,21 +67,7 @@ struct Trial<'a> {
     displacement: DVec3,
     grasp_s: f64,
     /// The recorded lift that is reproduced.
-    recorded: Option<(usize, &'a Reproduced)>,
-}
-
-/// A measured lift in the frame of the specimen.
-struct Reproduced {
-    lift: MeasuredLift,
-    grasp_s: f64,
-    /// From the recording to the specimen: displacement of the apex (m), landmarks and points (m).
-    displacement: DVec3,
-    landmarks: Vec<DVec3>,
-    points: Vec<DVec3>,
-    /// Turns motions of the specimen into those of the recording.
-    back: glam::DMat3,
-    /// Median distance between the aligned centrelines (m).
-    left: f64,
+    recorded: Option<(usize, &'a SeenLift)>,
 }
 
 impl Study for LiftsExperiment {
@@ -97,25 +86,28 @@ impl Study for LiftsExperiment {
         let lifts = LiftOptions { count: self.lifts, support: self.true_support.into(), ..LiftOptions::default() };
         let options = RecordOptions { frames: 181, seed: self.seed, sensor: Sensor::Stereo, lifts };
         let specimen = phantoms::specimen("phantom-a", &options, None, &folder, job.progress)?;
-        let appendix = Appendix::of(&specimen)?;
+        let appendix = LoneOrgan::of(&specimen, "appendix")?;
         let recording = Recording::open(&folder.join("recording"))?;
         let measured = measure_recording(&recording, job.progress)?;
         let truth = measured.truth.clone();
         let summary = Measured::summary(&recording, &measured)?;
-        let reproduced: Vec<(usize, Reproduced)> = measured
+        let reproduced: Vec<(usize, SeenLift)> = measured
             .lifts
             .into_iter()
             .enumerate()
-            .filter_map(|(number, lift)| Some((number, Reproduced::of(lift.ok()?, &appendix)?)))
+            .filter_map(|(number, lift)| Some((number, SeenLift::of(lift.ok()?, &appendix)?)))
             .collect();
-        let own =
-            specimen.organs.iter().find(|o| o.name == "appendix").map_or(f64::NAN, |o| o.material.young_modulus_pa);
+        let own = appendix.organ().material.young_modulus_pa;
         let trials = self.trials(1e-3 * own, appendix.up(), &reproduced);
         let settings = format!("{:?} {:016x}", options, fingerprint(&specimen, &reproduced));
         let Outcomes { rows, resumed } =
             job.trials("lifts", &settings, &trials, Trial::key, self.threads, |trial, progress| {
                 trial.run(&appendix, progress)
             })?;
+        let folds = job.trials("identification", &settings, &[0, 1], |fold| format!("fold {fold}"), self.threads, |fold, progress| {
+            identified(*fold, &appendix, &reproduced, progress)
+        })?;
+        let identified = IdentifiedSummary::of(folds.rows);
         let (trend, errors) = (trend(&rows), errors(&rows));
         let chosen = errors.iter().find(|e| e.support == Support::Specimen.name() && e.modulus_kpa == 1e-3 * own);
         let left: Vec<f64> = reproduced.iter().map(|(_, r)| 1e3 * r.left).collect();
@@ -123,6 +115,8 @@ impl Study for LiftsExperiment {
             d50_residual_mm: residual(&trend, 1e-3 * own),
             landmark_rmse_mm: chosen.and_then(|e| e.landmark_rmse_mm),
             chamfer_mm: chosen.and_then(|e| e.chamfer_mm),
+            held_out_landmark_rmse_mm: identified.landmark_rmse_mm,
+            identified,
             landmark_floor_mm: summary.landmark_floor_mm,
             lift_mm: summary.lift_mm,
             static_rmse_mm: summary.static_rmse_mm,
@@ -157,7 +151,7 @@ impl LiftsExperiment {
     }
 
     /// All lifts; those with the specimen's own modulus are always among them.
-    fn trials<'a>(&self, own: f64, up: DVec3, reproduced: &'a [(usize, Reproduced)]) -> Vec<Trial<'a>> {
+    fn trials<'a>(&self, own: f64, up: DVec3, reproduced: &'a [(usize, SeenLift)]) -> Vec<Trial<'a>> {
         let with_own = |moduli: &[f64]| {
             let mut all = moduli.to_vec();
             all.push(own);
@@ -192,45 +186,6 @@ impl LiftsExperiment {
     }
 }
 
-impl Reproduced {
-    /// Aligns the centreline of a lift at rest with that of the specimen (paper section VII-F:
-    /// rigidly, places of the same arc length). `None` if too little of the lift is seen.
-    fn of(lift: MeasuredLift, appendix: &Appendix) -> Option<Self> {
-        let (profile, apex) = (lift.profile.as_ref()?, lift.apex?);
-        let stations = &lift.centreline.stations;
-        // The visible line ends half a width before each end of the organ.
-        let spare = 0.5 * (appendix.length() - lift.centreline.length()).max(0.0);
-        let place = |along: f64| ((along + spare) / appendix.length()).clamp(0.0, 1.0);
-        let points: Vec<DVec3> = stations.iter().map(|s| s.point).collect();
-        let fronts: Vec<DVec3> =
-            (0..points.len()).map(|i| appendix.front_at(place(i as f64 * trocar_measure::SPACING))).collect();
-        let ((rotation, a, b), left) = aligned(&points, &fronts);
-        let there = |p: DVec3| rotation * (p - a) + b;
-        let (rest, _): (Vec<DVec3>, Vec<DVec3>) = lift.surface(lift.peak).into_iter().unzip();
-        Some(Self {
-            grasp_s: place(profile.apex_at),
-            displacement: rotation * apex.displacement,
-            landmarks: lift.landmarks.iter().map(|l| there(l.rest)).collect(),
-            points: rest.into_iter().map(there).collect(),
-            back: rotation.transpose(),
-            left,
-            lift,
-        })
-    }
-
-    /// Landmark error and local Chamfer distance of a simulated lift (m).
-    fn compared(&self, appendix: &Appendix, lifted: &simulated::Lifted) -> [Option<f64>; 2] {
-        let moved = |points: &[DVec3]| -> Vec<DVec3> {
-            appendix.motions(lifted, points.to_vec()).into_iter().map(|d| self.back * d).collect()
-        };
-        let landmarks: Vec<Option<DVec3>> = moved(&self.landmarks).into_iter().map(Some).collect();
-        let surface = self.lift.surface(self.lift.peak);
-        let (rest, now): (Vec<DVec3>, Vec<DVec3>) = surface.into_iter().unzip();
-        let predicted: Vec<DVec3> = rest.iter().zip(moved(&self.points)).map(|(p, d)| *p + d).collect();
-        [self.lift.landmark_rmse(&landmarks), chamfer(&predicted, &now)]
-    }
-}
-
 impl Trial<'_> {
     fn key(&self) -> String {
         let what = self.recorded.map_or("up".to_owned(), |(number, _)| format!("lift {number}"));
@@ -238,8 +193,13 @@ impl Trial<'_> {
         format!("{what}, {}, {modulus_kpa} kPa, {displacement} m at {grasp_s}", support.name())
     }
 
-    fn run(&self, appendix: &Appendix, progress: &dyn Progress) -> Result<SimulatedRow> {
-        let lifted = appendix.lift(self.support, 1e3 * self.modulus_kpa, self.grasp_s, self.displacement, progress)?;
+    fn run(&self, appendix: &LoneOrgan, progress: &dyn Progress) -> Result<SimulatedRow> {
+        let held = appendix.with(|organ| {
+            organ.material.young_modulus_pa = 1e3 * self.modulus_kpa;
+            organ.pins = self.support.pins(organ.pins);
+        });
+        let pull = Pull { s: self.grasp_s, displacement: self.displacement, grip: Grip::Cluster };
+        let lifted = held.lift(&[pull], Pace::SLOW, progress)?.pop().flatten();
         let profile = lifted.as_ref().and_then(|l| appendix.profile(l));
         let [rmse, chamfer] = match (&self.recorded, &lifted) {
             (Some((_, reproduced)), Some(lifted)) => reproduced.compared(appendix, lifted),
@@ -263,7 +223,7 @@ impl Trial<'_> {
 }
 
 /// A hash of everything that the trials depend on besides their keys.
-fn fingerprint(specimen: &trocar_specimen::Specimen, reproduced: &[(usize, Reproduced)]) -> u64 {
+fn fingerprint(specimen: &trocar_specimen::Specimen, reproduced: &[(usize, SeenLift)]) -> u64 {
     let mut text = format!("{:016x}", trocar_task::specimen_hash(specimen));
     for (number, lift) in reproduced {
         text += &format!("{number} {:?} {:?}", lift.landmarks, lift.lift.landmarks);

@@ -1,9 +1,10 @@
 //! The figures of the study.
 
-use super::simulated::Support;
+use super::support::Support;
 use crate::trials::Resumed;
 use serde::{Deserialize, Serialize};
 use trocar_measure::{Line, PAPER};
+use trocar_specimen::Posterior;
 use trocar_workflow::measure::Measured;
 
 /// Heights at which the simulation is compared with the paper's line (mm).
@@ -37,6 +38,64 @@ pub struct SimulatedRow {
     pub chamfer_mm: Option<f64>,
     /// Distance from the apex (mm), and lift over the greatest lift.
     pub profile: Vec<[f64; 2]>,
+}
+
+/// A recorded lift that was not fitted, reproduced with the identified values.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JudgedRow {
+    /// Number of the lift.
+    pub lift: usize,
+    /// Displacement of the grasped tissue (mm).
+    pub displacement_mm: f64,
+    /// Landmark error (mm).
+    pub landmark_rmse_mm: Option<f64>,
+    /// Local Chamfer distance (mm).
+    pub chamfer_mm: Option<f64>,
+    /// Landmark error without the identified threads (mm).
+    pub without_threads_mm: Option<f64>,
+}
+
+/// What is identified from half of the recorded lifts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FoldRow {
+    /// The values that explain these lifts best, by the names of the parameters.
+    pub values: Vec<(String, f64)>,
+    /// The posterior.
+    pub posterior: Posterior,
+    /// Landmark error of the fitted lifts (mm).
+    pub fitted_rmse_mm: f64,
+    /// Error of the model over the lift.
+    pub model_error: f64,
+    /// The other lifts.
+    pub judged: Vec<JudgedRow>,
+}
+
+/// Both halves.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct IdentifiedSummary {
+    /// Median landmark error of lifts that were not fitted (mm).
+    pub landmark_rmse_mm: Option<f64>,
+    /// The same without the identified threads (mm).
+    pub without_threads_mm: Option<f64>,
+    /// Median local Chamfer distance (mm).
+    pub chamfer_mm: Option<f64>,
+    /// From the even lifts, and from the odd ones.
+    pub folds: Vec<FoldRow>,
+}
+
+impl IdentifiedSummary {
+    /// Of the two halves.
+    pub(super) fn of(folds: Vec<FoldRow>) -> Self {
+        let middle = |of: &dyn Fn(&JudgedRow) -> Option<f64>| {
+            trocar_core::median(folds.iter().flat_map(|f| &f.judged).filter_map(of).collect::<Vec<_>>())
+        };
+        Self {
+            landmark_rmse_mm: middle(&|j| j.landmark_rmse_mm),
+            without_threads_mm: middle(&|j| j.without_threads_mm),
+            chamfer_mm: middle(&|j| j.chamfer_mm),
+            folds,
+        }
+    }
 }
 
 /// The means over the places of lifts straight up.
@@ -82,6 +141,11 @@ pub struct LiftsResult {
     /// Median landmark error of the reproduced lifts, with the specimen's own pins and modulus
     /// (mm).
     pub landmark_rmse_mm: Option<f64>,
+    /// Median landmark error of lifts that were not fitted, with the support and the tissue that
+    /// are identified from the other half of the lifts (mm).
+    pub held_out_landmark_rmse_mm: Option<f64>,
+    /// What is identified.
+    pub identified: IdentifiedSummary,
     /// Median landmark difference between two frames at the peak (mm).
     pub landmark_floor_mm: Option<f64>,
     /// Median greatest lift of the recorded lifts (mm).
