@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use trocar_core::{Progress, Silent};
-use trocar_scene::{BackendName, Scene, Split, VariationSet};
+use trocar_scene::{BackendName, Scene, Split, TissueSource, VariationSet};
 use trocar_workflow::{Error, Result, SpecimenCache, drawn_specimens, read_varied, refuse_overlap};
 
 /// Maximum number of parallel episodes per core. Each has its own cell in memory.
@@ -44,6 +44,7 @@ pub const DEFAULT_VARIATION: VariationSet = VariationSet::Standard;
 ///     split: Default::default(),
 ///     seed: 0,
 ///     variation: None,
+///     tissue: None,
 ///     backend: None,
 ///     cell_mm: None,
 ///     by: Vec::new(),
@@ -73,6 +74,8 @@ pub struct Campaign {
     /// The set of factors that vary between episodes, instead of the scene's. Without one, a scene
     /// that has no set varies by [`DEFAULT_VARIATION`].
     pub variation: Option<VariationSet>,
+    /// Where support and tissue of organs come from, instead of what the scene says.
+    pub tissue: Option<TissueSource>,
     /// What bears the tissue, instead of the scene's backend.
     pub backend: Option<BackendName>,
     /// Edge of the lattice's cells (mm), instead of the scene's; for the lattice only.
@@ -115,6 +118,7 @@ impl Campaign {
         progress: &dyn Progress,
     ) -> Result<(Store, Manifest, Vec<By>)> {
         let mut scene = read_varied(&self.scene, self.variation, DEFAULT_VARIATION)?;
+        scene.variation.tissue = self.tissue.unwrap_or(scene.variation.tissue);
         if let Some(backend) = self.backend {
             scene.tissue = scene.tissue.on(backend);
         }

@@ -26,6 +26,7 @@ fn campaign(folder: &Path, policies: &[&str], episodes: usize) -> Campaign {
         episodes,
         split: Split::Seen,
         seed: 0,
+        tissue: None,
         variation: Some(VariationSet::None),
         backend: None,
         cell_mm: None,

@@ -3,6 +3,7 @@
 mod episode;
 mod evaluate;
 mod export;
+mod identify;
 mod measure;
 mod render;
 mod scene;
@@ -14,6 +15,7 @@ mod view;
 pub use episode::*;
 pub use evaluate::*;
 pub use export::*;
+pub use identify::*;
 pub use measure::*;
 pub use render::*;
 pub use scene::*;
@@ -25,7 +27,7 @@ pub use view::*;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use trocar_scene::{BackendName, Split, VariationSet};
+use trocar_scene::{BackendName, Split, TissueSource, VariationSet};
 
 /// Trocar makes deformable organs from recordings of a surgical field, and scores robot policies on
 /// them.
@@ -58,6 +60,9 @@ pub enum Command {
     /// Measure grasp-lifts of a recording or an episode: lift profile, half-drop distance,
     /// landmarks.
     Measure(Measure),
+    /// Identify what holds an organ and how stiff it is from the grasp-lifts of a recording: a
+    /// specimen with a posterior.
+    Identify(Identify),
     /// Make masks of a recording: organs by SAM 2.1 from points, instruments by the appearance of
     /// metal or followed by SAM 2.1.
     Segment(Segment),
@@ -106,6 +111,12 @@ fn variation_set(name: &str) -> Result<VariationSet, String> {
 fn backend(name: &str) -> Result<BackendName, String> {
     let known = BackendName::ALL.map(BackendName::name).join(", ");
     BackendName::named(name).ok_or_else(|| format!("the backends are {known}"))
+}
+
+/// The source of tissue of that name, for the command line.
+fn tissue_source(name: &str) -> Result<TissueSource, String> {
+    let known = TissueSource::ALL.map(TissueSource::name).join(", ");
+    TissueSource::named(name).ok_or_else(|| format!("the sources are {known}"))
 }
 
 /// The split of that name, for the command line.

@@ -1,9 +1,11 @@
 //! Identification: rounds of simulated lifts, each nearer to the measured ones.
 
 use crate::emulator::{Emulator, Foretold};
+use crate::left_open::left_open;
 use crate::likelihood::Likelihood;
 use crate::lone_organ::{LoneOrgan, Pace};
 use crate::observation::Observation;
+use crate::quantile::normal_quantile;
 use crate::walkers::walk;
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -11,9 +13,9 @@ use trocar_core::{Progress, Random};
 use trocar_geometry::Skin;
 use trocar_specimen::{Parameter, Posterior, Prior};
 
-/// Simulated values of the first round, from the prior, and of each further round.
-const FIRST: usize = 96;
-const FURTHER: [usize; 2] = [48, 48];
+/// Simulated values a parameter: of the first round, from the prior, and of each further round.
+const FIRST: usize = 16;
+const FURTHER: [usize; 2] = [8, 8];
 
 /// Walkers, and rounds of a walk: before draws are kept, in all, and between kept ones.
 const WALKERS: usize = 32;
@@ -50,8 +52,6 @@ pub struct Identified {
     pub rmse: f64,
     /// Error of the model over the lift: median of the posterior.
     pub model_error: f64,
-    /// Draws from the posterior, as scores.
-    pub draws: Vec<Vec<f64>>,
     /// Simulated values, and those of them that diverged.
     pub simulated: usize,
     /// See `simulated`.
@@ -81,7 +81,7 @@ impl Identification {
                 "the lifts have {landmarks} landmarks that are seen; there must be at least {LEAST_LANDMARKS}"
             )));
         }
-        let total = FIRST + FURTHER.iter().sum::<usize>();
+        let total = (FIRST + FURTHER.iter().sum::<usize>()) * self.priors.len();
         progress.begin("simulated lifts", (total * self.lifts.len()) as u64);
         let result = self.rounds(progress);
         progress.end();
@@ -107,7 +107,7 @@ impl Identification {
             if let Some(count) = FURTHER.get(round) {
                 let pick = random.stream(20 + round as u64);
                 let one = |i: usize| ((pick.uniform(i as u64) * draws.len() as f64) as usize).min(draws.len() - 1);
-                asked = (0..*count).map(|i| draws[one(i)][..self.priors.len()].to_vec()).collect();
+                asked = (0..count * self.priors.len()).map(|i| draws[one(i)][..self.priors.len()].to_vec()).collect();
             }
         }
         self.conclude(&points, &likelihood, draws, [simulated, diverged])
@@ -115,13 +115,14 @@ impl Identification {
 
     /// Points that cover the prior evenly: a Latin hypercube.
     fn spread(&self, random: Random) -> Vec<Vec<f64>> {
-        let mut points = vec![vec![0.0; self.priors.len()]; FIRST];
+        let count = FIRST * self.priors.len();
+        let mut points = vec![vec![0.0; self.priors.len()]; count];
         for k in 0..self.priors.len() {
             let own = random.stream(k as u64);
-            let mut order: Vec<usize> = (0..FIRST).collect();
+            let mut order: Vec<usize> = (0..count).collect();
             order.sort_by_key(|i| own.bits(*i as u64));
             for (i, rank) in order.into_iter().enumerate() {
-                let share = (rank as f64 + own.stream(1).uniform(i as u64)) / FIRST as f64;
+                let share = (rank as f64 + own.stream(1).uniform(i as u64)) / count as f64;
                 points[i][k] = normal_quantile(share);
             }
         }
@@ -130,8 +131,13 @@ impl Identification {
 
     /// The numbers of all lifts at these scores; `None` where a lift diverged.
     fn simulate(&self, asked: &[Vec<f64>], bound: &[Skin], progress: &dyn Progress) -> Result<Vec<Option<Point>>> {
+        let one = |scores: &Vec<f64>| self.simulate_one(scores, bound, progress);
+        // A pool of one thread would let a caller's pool begin other work meanwhile.
+        if self.threads == 1 {
+            return asked.iter().map(one).collect();
+        }
         let pool = trocar_core::thread_pool(self.threads).map_err(Error::Lifts)?;
-        pool.install(|| asked.par_iter().map(|scores| self.simulate_one(scores, bound, progress)).collect())
+        pool.install(|| asked.par_iter().map(one).collect())
     }
 
     fn simulate_one(&self, scores: &[f64], bound: &[Skin], progress: &dyn Progress) -> Result<Option<Point>> {
@@ -192,7 +198,12 @@ impl Identification {
         let parameters = 0..self.priors.len();
         let mean: Vec<f64> = parameters.clone().map(|k| draws.iter().map(|d| d[k]).sum::<f64>() / count).collect();
         let product = |i: usize, j: usize| draws.iter().map(|d| (d[i] - mean[i]) * (d[j] - mean[j])).sum::<f64>();
-        let covariance = parameters.clone().map(|i| parameters.clone().map(|j| product(i, j) / count).collect());
+        let mut covariance: Vec<Vec<f64>> =
+            parameters.clone().map(|i| parameters.clone().map(|j| product(i, j) / count).collect()).collect();
+        for k in parameters {
+            let open = left_open(&self.priors[k], mean[k]);
+            covariance[k][k] += open * open;
+        }
         let best = points
             .iter()
             .map(|p| (self.log_at(p, likelihood), p))
@@ -204,7 +215,7 @@ impl Identification {
             recording: self.recording.clone(),
             lifts: self.lifts.iter().map(|l| l.number).collect(),
             landmark_rmse_mm: 1e3 * rmse,
-            covariance: covariance.collect(),
+            covariance,
             mean,
             parameters: self.priors.clone(),
         };
@@ -215,7 +226,6 @@ impl Identification {
             best: self.values(&best.scores),
             rmse,
             model_error: trocar_core::median(errors).unwrap_or(f64::NAN),
-            draws: draws.into_iter().map(|d| d[..self.priors.len()].to_vec()).collect(),
             simulated,
             diverged,
         })
@@ -230,61 +240,5 @@ impl Identification {
             lift.rmse(own).powi(2)
         });
         (squares.sum::<f64>() / self.lifts.len().max(1) as f64).sqrt()
-    }
-}
-
-/// The score below which a share of the standard normal distribution lies (P. J. Acklam's rational
-/// approximation, to a relative 1e-9; here for shares within (0, 1)).
-fn normal_quantile(share: f64) -> f64 {
-    const A: [f64; 6] = [
-        -39.696_830_286_653_8,
-        220.946_098_424_521,
-        -275.928_510_446_969,
-        138.357_751_867_269,
-        -30.664_798_066_147_2,
-        2.506_628_277_459_24,
-    ];
-    const B: [f64; 5] = [
-        -54.476_098_798_224_1,
-        161.585_836_858_041,
-        -155.698_979_859_887,
-        66.801_311_887_719_7,
-        -13.280_681_552_885_7,
-    ];
-    const C: [f64; 6] = [
-        -7.784_894_002_430_29e-3,
-        -0.322_396_458_041_136,
-        -2.400_758_277_161_84,
-        -2.549_732_539_343_73,
-        4.374_664_141_464_97,
-        2.938_163_982_698_78,
-    ];
-    const D: [f64; 4] =
-        [7.784_695_709_041_46e-3, 0.322_467_129_070_04, 2.445_134_137_143, 3.754_408_661_907_42];
-    let polynomial = |c: &[f64], x: f64| c.iter().fold(0.0, |sum, c| sum * x + c);
-    let tail = |p: f64| {
-        let q = (-2.0 * p.ln()).sqrt();
-        polynomial(&C, q) / (polynomial(&D, q) * q + 1.0)
-    };
-    let share = share.clamp(1e-9, 1.0 - 1e-9);
-    if share < 0.02425 {
-        tail(share)
-    } else if share > 1.0 - 0.02425 {
-        -tail(1.0 - share)
-    } else {
-        let (q, r) = (share - 0.5, (share - 0.5) * (share - 0.5));
-        polynomial(&A, r) * q / (polynomial(&B, r) * r + 1.0)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::normal_quantile;
-
-    #[test]
-    fn quantiles_are_those_of_the_normal_distribution() {
-        for (share, score) in [(0.5, 0.0), (0.95, 1.644_853_6), (0.01, -2.326_347_9), (0.25, -0.674_489_75)] {
-            assert!((normal_quantile(share) - score).abs() < 1e-6, "{share}: {}", normal_quantile(share));
-        }
     }
 }

@@ -9,10 +9,12 @@ mod dense;
 mod emulator;
 mod error;
 mod identification;
+mod left_open;
 mod likelihood;
 mod lone_organ;
 mod observation;
 mod prior;
+mod quantile;
 mod seen;
 mod walkers;
 

@@ -13,15 +13,15 @@ use glam::DVec3;
 pub(crate) const TRACKER: f64 = 0.25e-3;
 
 /// Length along the organ over which errors of the model are alike (m).
-const ALIKE: f64 = 12e-3;
+const ALIKE: f64 = 20e-3;
 
 /// Share of the variance of the model's error that all lifts have in common.
-const COMMON: f64 = 0.5;
+const COMMON: f64 = 0.8;
 
 /// Median of the error of the model over the lift before anything is seen, and the deviation of its
 /// logarithm.
-const ERROR: f64 = 0.04;
-const ERROR_SPREAD: f64 = 0.7;
+const ERROR: f64 = 0.05;
+const ERROR_SPREAD: f64 = 0.6;
 
 /// Error of a measured force over the force, and beside it (N).
 const FORCE_SHARE: f64 = 0.1;

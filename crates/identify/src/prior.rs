@@ -14,7 +14,7 @@ pub fn default_priors() -> Vec<Prior> {
         Parameter::ThreadsFrom => [0.2, 0.97],
         Parameter::ThreadsSlack => [0.0, 0.02],
         Parameter::ThreadsStiffness => [5.0, 2e4],
-        Parameter::YoungModulus => [2e3, 1e5],
+        Parameter::YoungModulus => [3e3, 1e5],
         Parameter::PoissonRatio => [0.3, 0.49],
     };
     Parameter::ALL.map(|name| Prior { name, range: range(name), interval: [0.0; 3], width: 1.0 }).to_vec()

@@ -5,7 +5,7 @@ use crate::tissue_preset::TissuePreset;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use trocar_specimen::{End, Material, MaterialModel, Pins};
+use trocar_specimen::{End, Material, MaterialModel, Pins, Threads};
 
 /// Name of the ground under the organs in a filtered pair. No organ may have it.
 pub const FIELD: &str = "field";
@@ -144,6 +144,9 @@ pub struct OrganOverride {
     /// Which nodes are held where they were recorded; the specimen's rule if left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pins: Option<PinRule>,
+    /// Threads that hold it besides; the specimen's if left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub threads: Option<ThreadRule>,
 }
 
 /// Parts of a material that differ from the specimen's.
@@ -233,6 +236,35 @@ pub enum PinRule {
         #[serde(default)]
         band_share: f64,
     },
+}
+
+/// Threads from the lowest nodes along a part of an organ to where these were recorded: slack up to
+/// a length, and elastic beyond it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ThreadRule {
+    /// First organ coordinate that they hold, 0 to 1.
+    pub from: f64,
+    /// Last organ coordinate that they hold, above `from` and at most 1.
+    pub to: f64,
+    /// Length up to which they are slack (m), 0 to 0.2.
+    pub slack_m: f64,
+    /// Their stiffness per length of the organ (N/m2), 0 to 1e6.
+    pub stiffness_n_m2: f64,
+}
+
+impl ThreadRule {
+    /// Those of a specimen.
+    pub fn of(threads: Threads) -> Self {
+        let Threads { from, to, slack_m, stiffness_n_m2 } = threads;
+        Self { from, to, slack_m, stiffness_n_m2 }
+    }
+
+    /// The specimen's threads for it.
+    pub fn threads(&self) -> Threads {
+        let Self { from, to, slack_m, stiffness_n_m2 } = *self;
+        Threads { from, to, slack_m, stiffness_n_m2 }
+    }
 }
 
 impl PinRule {

@@ -1,6 +1,6 @@
 //! What lifts tell about an organ: a distribution over its support and its tissue.
 
-use crate::parameter::Parameter;
+use crate::parameter::{Parameter, Scale};
 use crate::Organ;
 use serde::{Deserialize, Serialize};
 
@@ -42,7 +42,7 @@ pub struct Prior {
     pub range: [f64; 2],
     /// The 5%, 50% and 95% quantiles of its value.
     pub interval: [f64; 3],
-    /// Width of the 90% interval over that of the prior, in scores.
+    /// Width of the 90% interval over that of the prior; of logarithms where these are spread evenly.
     pub width: f64,
 }
 
@@ -57,8 +57,13 @@ impl Posterior {
         for (k, prior) in self.parameters.iter_mut().enumerate() {
             let (mean, deviation) = (self.mean[k], self.covariance[k][k].max(0.0).sqrt());
             let at = |score: f64| prior.name.value(prior.range, mean + score * deviation);
-            prior.interval = [at(-NINETY), at(0.0), at(NINETY)];
-            prior.width = deviation;
+            let [low, high] = [at(-NINETY), at(NINETY)];
+            let [least, most] = [-NINETY, NINETY].map(|score| prior.name.value(prior.range, score));
+            prior.interval = [low, at(0.0), high];
+            prior.width = match prior.name.scale() {
+                Scale::Linear => (high - low) / (most - least),
+                Scale::Log => (high / low).ln() / (most / least).ln(),
+            };
         }
     }
 

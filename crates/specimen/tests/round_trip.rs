@@ -27,6 +27,7 @@ fn is_read_as_written() {
     assert_eq!(read.provenance, written.provenance);
     for (r, w) in read.organs.iter().zip(&written.organs) {
         assert_eq!((&r.name, &r.body, r.material, r.pins), (&w.name, &w.body, w.material, w.pins));
+        assert_eq!((r.threads, &r.posterior), (w.threads, &w.posterior));
         assert_eq!((r.base, r.facts, &r.surface.colors), (w.base, w.facts, &w.surface.colors));
         assert_eq!(r.surface.triangles, w.surface.triangles);
         for (a, b) in r.surface.vertices.iter().zip(&w.surface.vertices) {
@@ -48,6 +49,11 @@ fn mistakes_are_named() {
         ("poisson_ratio", "poissons_ratio", "did you mean `poisson_ratio`?"),
         ("poisson_ratio = 0.45", "poisson_ratio = 0.5", "organ 'appendix': material.poisson_ratio is 0.5"),
         ("band_share = 0.42", "band_share = 1.42", "pins.band_share is 1.42"),
+        ("slack_m = 0.008", "slack_m = -1.0", "organ 'appendix': threads.slack_m is -1"),
+        ("[0.03, 0.8]", "[0.04, 0.8]", "organ 'appendix': posterior.covariance[1][0] is 0.04"),
+        ("[0.03, 0.8]", "[0.03, 0.001]", "posterior.covariance has a negative direction"),
+        ("mean = [0.5, -1.0]", "mean = [0.5, nan]", "organ 'appendix': posterior.mean is [0.5, NaN]"),
+        ("name = \"young_modulus_pa\"", "name = \"young_modulus\"", "unknown variant `young_modulus`"),
         ("name = \"bowel-1\"", "name = \"appendix\"", "used twice"),
         ("name = \"bowel-1\"", "name = \"bowel-2\"", "bowel-2.msh"),
         ("st-venant-kirchhoff", "neo-hookean", "unknown variant `neo-hookean`"),

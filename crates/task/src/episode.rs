@@ -131,6 +131,7 @@ impl Episode {
         drawn: Drawn,
     ) -> Result<Self> {
         let specimen = supply.get(&drawn.specimen)?;
+        let drawn = scene.with_tissue_drawn(drawn, seed, &specimen)?;
         let arranged = scene.with_drawn(&drawn, &specimen);
         let key = key(scene, specimen_hash(&specimen))?;
         let (cell, built) = Built::new(foundation(scene, &arranged), specimen, threads)?;
@@ -192,7 +193,7 @@ impl Episode {
     /// # Errors
     /// As [`reset`](Self::reset).
     pub fn reset_with(&mut self, seed: u64, drawn: Drawn) -> Result<Observation> {
-        self.arrange(drawn)?;
+        self.arrange(seed, drawn)?;
         let starts = starts(&self.arranged, &self.cell);
         self.cell.restart(&self.built.settled, &starts)?;
         let task = &self.scene.task;
@@ -211,12 +212,13 @@ impl Episode {
     }
 
     /// Makes the cell that of `drawn`. The episode stays as it was on an error.
-    fn arrange(&mut self, drawn: Drawn) -> Result<()> {
+    fn arrange(&mut self, seed: u64, drawn: Drawn) -> Result<()> {
         let specimen = if drawn.specimen == self.drawn.specimen {
             Arc::clone(&self.built.specimen)
         } else {
             self.supply.get(&drawn.specimen)?
         };
+        let drawn = self.scene.with_tissue_drawn(drawn, seed, &specimen)?;
         let arranged = self.scene.with_drawn(&drawn, &specimen);
         let scene = foundation(&self.scene, &arranged);
         if scene != self.built.scene {
@@ -475,7 +477,7 @@ impl Episode {
         if state.key != self.key {
             return Err(Error::Option("state: is of another scene or specimen than this episode".to_owned()));
         }
-        self.arrange(state.drawn.clone())?;
+        self.arrange(state.now.seed, state.drawn.clone())?;
         self.cell.restore(&state.cell)?;
         self.now = state.now.clone();
         Ok(())

@@ -6,6 +6,7 @@ pub mod episode_replay;
 mod episode_run;
 mod error;
 mod gltf;
+pub mod identify;
 mod inspect;
 mod lift;
 mod lift_result;

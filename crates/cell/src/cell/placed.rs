@@ -63,6 +63,7 @@ impl Placed {
             if let Some(rule) = &change.pins {
                 organ.pins = rule.pins(far);
             }
+            organ.threads = change.threads.map(|rule| rule.threads()).or(organ.threads);
         }
         let contact = BodyContact {
             offset: 1e-3 * scene.tissue.contact_offset_mm,

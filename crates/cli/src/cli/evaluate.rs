@@ -2,7 +2,7 @@
 
 use clap::Args;
 use std::path::PathBuf;
-use trocar_scene::{BackendName, Split, VariationSet};
+use trocar_scene::{BackendName, Split, TissueSource, VariationSet};
 
 #[derive(Debug, Args)]
 pub struct Evaluate {
@@ -30,6 +30,11 @@ pub struct Evaluate {
     /// run makes the anatomies of the set, about a minute each.
     #[arg(long, value_name = "SET", value_parser = super::variation_set)]
     pub variation: Option<VariationSet>,
+    /// Support and tissue of organs: those of the specimen and the scene (specimen), or drawn for
+    /// each episode from what `trocar identify` wrote into the specimen (posterior); what the scene
+    /// says by default.
+    #[arg(long, value_name = "SOURCE", value_parser = super::tissue_source)]
+    pub tissue: Option<TissueSource>,
     /// What bears the tissue: tetrahedra (tets) or lattice; the scene's by default. Given twice, the
     /// campaign runs on both, in a folder each, and a page tells whether they judge policies alike.
     #[arg(long = "backend", value_name = "BACKEND", value_parser = super::backend)]

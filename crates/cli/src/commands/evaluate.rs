@@ -17,6 +17,7 @@ pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Re
         split: arguments.split,
         seed: arguments.seed,
         variation: arguments.variation,
+        tissue: arguments.tissue,
         backend: arguments.backends.first().copied(),
         cell_mm: None,
         by: arguments.by.clone(),

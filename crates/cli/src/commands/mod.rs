@@ -4,6 +4,7 @@ mod demo;
 mod episode;
 mod evaluate;
 mod export;
+mod identify;
 mod inspect;
 mod measure;
 mod reconstruct;
@@ -32,6 +33,7 @@ pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
         Command::Replay(arguments) => episode::replay_file(arguments, cli.json, progress)?,
         Command::Export(arguments) => export::run(arguments, cli.json, cli.quiet, progress)?,
         Command::Sweep(arguments) => episode::sweep(arguments, cli.json, progress)?,
+        Command::Identify(arguments) => identify::run(arguments, cli.json, progress)?,
         Command::Inspect(arguments) => inspect::run(arguments, cli.json)?,
         Command::Measure(arguments) => measure::run(arguments, cli.json, progress)?,
         Command::Record(arguments) => record::run(arguments, cli.json, progress)?,

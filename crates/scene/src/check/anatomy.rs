@@ -20,6 +20,9 @@ pub(super) fn check(scene: &Scene) -> Checked {
         if let Some(rule) = &said.pins {
             pins(&join(&at, "pins"), rule)?;
         }
+        if let Some(rule) = &said.threads {
+            rule.threads().validate().map_err(|reason| field_of(&join(&at, "threads"), &reason))?;
+        }
     }
     let t = &scene.tissue;
     numbers(

@@ -15,6 +15,7 @@ impl Scene {
         scene.specimen = drawn.specimen.clone();
         scene.place_specimen(drawn, specimen);
         scene.vary_tissue(drawn, specimen);
+        scene.vary_posterior(drawn, specimen);
         scene.vary_pictures(drawn);
         scene.vary_tools(drawn);
         scene.vary_starts(drawn);

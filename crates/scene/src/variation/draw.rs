@@ -1,5 +1,6 @@
 //! Drawing: the values of one episode by its seed.
 
+use super::tissue::{DrawnTissue, tissue_name, tissue_named};
 use super::{Factor, Per, Specimens, Split, VariationSet};
 use crate::{EpisodeRandom, Error, Lens, Result, Scene, SpecimenSource, Tool};
 use serde::de::{Error as _, MapAccess, Visitor};
@@ -70,13 +71,16 @@ pub struct Drawn {
     pub specimen: SpecimenSource,
     /// The numbers, in the order of the factors, then by part and axis.
     pub values: Vec<DrawnValue>,
+    /// Support and tissue of organs, where they are drawn from posteriors. In tables a value has the
+    /// name `ORGAN.PARAMETER`.
+    pub tissue: DrawnTissue,
 }
 
 impl Drawn {
-    fn new(specimen: SpecimenSource, mut values: Vec<DrawnValue>) -> Self {
+    fn new(specimen: SpecimenSource, mut values: Vec<DrawnValue>, tissue: DrawnTissue) -> Self {
         let order = |v: &DrawnValue| (v.factor, v.part.clone(), v.axis);
         values.sort_by_cached_key(order);
-        Self { specimen, values }
+        Self { specimen, values, tissue }
     }
 
     /// The words beside the numbers, by their names in tables: the specimen, and those that single
@@ -113,12 +117,15 @@ impl Drawn {
 
 impl Serialize for Drawn {
     fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(1 + self.values.len()))?;
+        let mut map = serializer.serialize_map(None)?;
         for (name, word) in self.words() {
             map.serialize_entry(&name, &word)?;
         }
         for value in &self.values {
             map.serialize_entry(&value.name(), &value.value)?;
+        }
+        for (of, value) in &self.tissue {
+            map.serialize_entry(&tissue_name(of), value)?;
         }
         map.end()
     }
@@ -136,6 +143,7 @@ impl<'de> Deserialize<'de> for Drawn {
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> std::result::Result<Drawn, A::Error> {
                 let (mut specimen, mut swapped, mut values) = (None, BTreeMap::new(), Vec::new());
+                let mut tissue = DrawnTissue::new();
                 while let Some(name) = map.next_key::<String>()? {
                     if name == super::SPECIMEN {
                         specimen = Some(SpecimenSource::labelled(&map.next_value::<String>()?));
@@ -145,11 +153,16 @@ impl<'de> Deserialize<'de> for Drawn {
                         swapped.insert(organ.to_owned(), map.next_value()?);
                         continue;
                     }
-                    let value = DrawnValue::named(&name, map.next_value()?);
+                    let number = map.next_value()?;
+                    if let (Some(of), None) = (tissue_named(&name), DrawnValue::named(&name, 0.0)) {
+                        tissue.insert(of, number);
+                        continue;
+                    }
+                    let value = DrawnValue::named(&name, number);
                     values.push(value.ok_or_else(|| A::Error::custom(format!("'{name}' is no drawn number")))?);
                 }
                 let specimen = specimen.ok_or_else(|| A::Error::missing_field(super::SPECIMEN))?;
-                Ok(Drawn::new(SpecimenSource { swapped, ..specimen }, values))
+                Ok(Drawn::new(SpecimenSource { swapped, ..specimen }, values, tissue))
             }
         }
         deserializer.deserialize_map(Numbers)
@@ -189,7 +202,7 @@ impl Scene {
                 }
             }
         }
-        Drawn::new(self.draw_specimen(seed), values)
+        Drawn::new(self.draw_specimen(seed), values, DrawnTissue::new())
     }
 
     /// The names of the parts that a factor is drawn for. An arm without a base has none to shift,

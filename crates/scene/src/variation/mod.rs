@@ -7,11 +7,13 @@ mod draw;
 mod factor;
 mod sets;
 mod split;
+mod tissue;
 
 pub use distribution::Distribution;
 pub use draw::{Drawn, DrawnValue};
 pub use factor::{Factor, Per};
 pub use split::Split;
+pub use tissue::{DrawnTissue, TissueSource};
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Error as _, MapAccess, Visitor};
@@ -90,6 +92,8 @@ pub struct Variation {
     pub specimens: Option<Specimens>,
     /// Organs that come from another of the specimens.
     pub swapped: Vec<String>,
+    /// Where support and tissue of organs come from.
+    pub tissue: TissueSource,
     /// Distributions of single factors.
     pub factors: BTreeMap<Factor, Distribution>,
 }
@@ -98,6 +102,7 @@ const SET: &str = "set";
 const SPECIMEN: &str = "specimen";
 const SPECIMENS: &str = "specimens";
 const SWAPPED: &str = "swapped";
+const TISSUE: &str = "tissue";
 
 impl Variation {
     /// The distributions of all factors that are drawn: those of the set, and the scene's own
@@ -132,6 +137,7 @@ impl Variation {
     /// Whether episodes depend on their seed.
     pub fn varies(&self) -> bool {
         self.specimens.is_some()
+            || self.tissue != TissueSource::Specimen
             || !self.swapped.is_empty()
             || self.set >= VariationSet::Standard
             || self.all_factors().values().any(Distribution::varies)
@@ -144,6 +150,9 @@ impl Serialize for Variation {
         map.serialize_entry(SET, &self.set)?;
         if !self.swapped.is_empty() {
             map.serialize_entry(SWAPPED, &self.swapped)?;
+        }
+        if self.tissue != TissueSource::Specimen {
+            map.serialize_entry(TISSUE, &self.tissue)?;
         }
         for (factor, distribution) in &self.factors {
             map.serialize_entry(factor.name(), distribution)?;
@@ -162,7 +171,7 @@ impl<'de> Deserialize<'de> for Variation {
             type Value = Variation;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a table of `set`, `specimens`, `swapped` and factors")
+                f.write_str("a table of `set`, `specimens`, `swapped`, `tissue` and factors")
             }
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Variation, A::Error> {
@@ -172,6 +181,7 @@ impl<'de> Deserialize<'de> for Variation {
                         (SET, _) => variation.set = map.next_value()?,
                         (SPECIMENS, _) => variation.specimens = Some(map.next_value()?),
                         (SWAPPED, _) => variation.swapped = map.next_value()?,
+                        (TISSUE, _) => variation.tissue = map.next_value()?,
                         (_, Some(factor)) => _ = variation.factors.insert(factor, map.next_value()?),
                         (unknown, None) => return Err(A::Error::unknown_field(unknown, known())),
                     }
@@ -186,7 +196,7 @@ impl<'de> Deserialize<'de> for Variation {
 /// The keys of the table.
 fn known() -> &'static [&'static str] {
     static KEYS: std::sync::OnceLock<Vec<&'static str>> = std::sync::OnceLock::new();
-    KEYS.get_or_init(|| [SET, SPECIMENS, SWAPPED].into_iter().chain(Factor::NAMES.iter().copied()).collect())
+    KEYS.get_or_init(|| [SET, SPECIMENS, SWAPPED, TISSUE].into_iter().chain(Factor::NAMES.iter().copied()).collect())
 }
 
 impl JsonSchema for Variation {
@@ -206,6 +216,9 @@ impl JsonSchema for Variation {
         let said = "Organs that come from another of the specimens than the rest, each as likely.";
         let organs = generator.subschema_for::<Vec<String>>();
         properties.insert(SWAPPED.to_owned(), serde_json::json!({ "description": said, "allOf": [organs] }));
+        let source = generator.subschema_for::<TissueSource>();
+        let said = "Support and tissue of organs: specimen, or posterior to draw them from what lifts tell.";
+        properties.insert(TISSUE.to_owned(), serde_json::json!({ "description": said, "allOf": [source] }));
         for factor in Factor::ALL {
             let one = serde_json::json!({ "description": factor.about(), "allOf": [distribution] });
             properties.insert(factor.name().to_owned(), one);

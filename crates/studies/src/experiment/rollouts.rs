@@ -152,6 +152,7 @@ pub(super) fn campaign(scene: &SceneChoice, rollouts: usize, seed: u64, jobs: us
         episodes: rollouts.div_ceil(POLICIES.len()),
         split: Split::Seen,
         seed,
+        tissue: None,
         variation: Some(VariationSet::None),
         backend: None,
         cell_mm: None,

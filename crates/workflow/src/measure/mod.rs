@@ -79,6 +79,8 @@ pub struct Measured {
 pub struct MeasuredRecording {
     /// The measured lifts.
     pub lifts: Vec<std::result::Result<MeasuredLift, String>>,
+    /// The organ of each.
+    pub organs: Vec<String>,
     /// The truth of a phantom.
     pub truth: Option<LiftsTruth>,
 }
@@ -151,13 +153,13 @@ pub fn measure_recording(recording: &Recording, progress: &dyn Progress) -> Resu
     if lifts.is_empty() {
         return Err(wrong("there is no [[lift]]; add rest, first, last and click of each lift".into()));
     }
-    let mut masks: Vec<(Mask, Option<[f64; 2]>)> = Vec::new();
+    let mut masks: Vec<(Mask, Option<[f64; 2]>, &str)> = Vec::new();
     for organ in &recording.info.organs {
-        masks.extend(trocar_reconstruct::drawn_mask(recording, organ)?.map(|mask| (mask, organ.base_px)));
+        masks.extend(trocar_reconstruct::drawn_mask(recording, organ)?.map(|mask| (mask, organ.base_px, organ.name.as_str())));
     }
     let organ = |lift: &LiftInfo| {
         let [u, v] = lift.click.map(|c| c.round() as usize);
-        masks.iter().find(|(mask, _)| mask.set.get(v * mask.width + u).copied().unwrap_or(false))
+        masks.iter().find(|(mask, ..)| mask.set.get(v * mask.width + u).copied().unwrap_or(false))
     };
     let chosen = lifts.iter().enumerate().map(|(i, lift)| {
         let [u, v] = lift.click;
@@ -167,9 +169,10 @@ pub fn measure_recording(recording: &Recording, progress: &dyn Progress) -> Resu
     });
     let chosen = chosen.collect::<Result<Vec<_>>>()?;
     let mut film = RecordingFilm::new(recording);
-    let mut measured = Vec::new();
+    let (mut measured, mut organs) = (Vec::new(), Vec::new());
     progress.begin("lifts", lifts.iter().map(|l| (l.last - l.rest + 1) as u64).sum());
-    for (info, (mask, base)) in lifts.iter().zip(chosen) {
+    for (info, (mask, base, organ)) in lifts.iter().zip(chosen) {
+        organs.push((*organ).to_owned());
         match MeasuredLift::of(&mut film, info, mask, *base, progress) {
             Ok(lift) => measured.push(Ok(lift)),
             Err(error @ trocar_measure::Error::Organ { .. }) => measured.push(Err(error.to_string())),
@@ -180,7 +183,7 @@ pub fn measure_recording(recording: &Recording, progress: &dyn Progress) -> Resu
         }
     }
     progress.end();
-    Ok(MeasuredRecording { lifts: measured, truth: LiftsTruth::read(&recording.dir().join("truth"))? })
+    Ok(MeasuredRecording { lifts: measured, organs, truth: LiftsTruth::read(&recording.dir().join("truth"))? })
 }
 
 /// The pixel of a mask that is nearest to its middle.

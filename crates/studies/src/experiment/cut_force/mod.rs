@@ -117,7 +117,7 @@ fn scene(toughness: f64, force: f64) -> Scene {
     scene.instruments = vec![Instrument { jaw_force_n: force, ..Instrument::of(InstrumentKind::Cutter) }];
     scene.task.sever = true;
     let material = MaterialOverride { toughness_j_m2: Some(toughness), ..MaterialOverride::default() };
-    scene.organs = BTreeMap::from([("tissue".to_owned(), OrganOverride { material, pins: None })]);
+    scene.organs = BTreeMap::from([("tissue".to_owned(), OrganOverride { material, ..OrganOverride::default() })]);
     scene
 }
 

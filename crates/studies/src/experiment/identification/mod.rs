@@ -18,7 +18,7 @@ use trocar_report::document::Document;
 
 /// Cells of the fitted mesh and of the coarser one (mm).
 const CELL_MM: f64 = 4.0;
-const COARSER_MM: f64 = 5.5;
+const COARSER_MM: f64 = 4.8;
 
 /// Share of the phantoms whose interval must hold the truth.
 const COVERED: f64 = 0.8;

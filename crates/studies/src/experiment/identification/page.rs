@@ -23,7 +23,7 @@ pub(super) fn document(r: &IdentificationResult, phantoms: usize) -> Result<Docu
     let mut section = Section::new("Identification", lead).cards(cards(r)).table(coverage(&r.coverage));
     section = section.table(errors(&r.errors)).lines(resumed(&r.resumed, "fits"));
     let plots = Parameter::ALL.into_iter().map(|p| intervals(r, p)).collect::<Result<Vec<_>>>()?;
-    let said = "The 90% interval of each phantom over the true value, default fit, in the prior's own scale.";
+    let said = "The 90% interval of each phantom over the true value, default fit, on the scale of the prior.";
     Ok(Document::new("Identification", "What lifts tell of support and tissue")
         .with(section)
         .with(Section::new("Intervals", said).figures(plots)))
@@ -84,7 +84,7 @@ fn errors(rows: &[ErrorRow]) -> Table {
 fn intervals(r: &IdentificationResult, parameter: Parameter) -> Result<String> {
     let (name, unit, factor) = parameter.said();
     let log = parameter.scale() == trocar_specimen::Scale::Log;
-    let scaled = |value: f64| if log { (factor * value).max(1e-12).log10() } else { factor * value };
+    let scaled = |value: f64| factor * value;
     let range = trocar_identify::default_priors().into_iter().find(|p| p.name == parameter).map(|p| p.range);
     let [low, high] = range.unwrap_or([0.0, 1.0]).map(scaled);
     let mut lines = vec![Line::new(vec![(low, low), (high, high)], PRIOR)];
@@ -94,17 +94,13 @@ fn intervals(r: &IdentificationResult, parameter: Parameter) -> Result<String> {
             let x = scaled(p.truth);
             let color = if p.holds { colors::organ(0) } else { MISSED };
             lines.push(Line::new(vec![(x, scaled(p.interval[0])), (x, scaled(p.interval[2]))], color));
-            let tick = 0.006 * (high - low);
-            lines.push(Line::new(vec![(x - tick, scaled(p.interval[1])), (x + tick, scaled(p.interval[1]))], color));
+            let [left, right] = if log { [x / 1.02, x * 1.02] } else { [x - 0.006 * (high - low), x + 0.006 * (high - low)] };
+            lines.push(Line::new(vec![(left, scaled(p.interval[1])), (right, scaled(p.interval[1]))], color));
         }
     }
-    let unit = match (log, unit.is_empty()) {
-        (true, _) => format!(" (log10 of {unit})"),
-        (false, true) => String::new(),
-        (false, false) => format!(" ({unit})"),
-    };
+    let unit = if unit.is_empty() { String::new() } else { format!(" ({unit})") };
     let (x, y) = (format!("true {name}{unit}"), format!("identified{unit}"));
-    let plot = Plot { title: name, x: &x, y: &y, lines, show: vec![low, high], ..Plot::default() };
+    let plot = Plot { title: name, x: &x, y: &y, lines, show: vec![low, high], log_x: log, log_y: log, ..Plot::default() };
     let legend =
         page::legend([("holds the truth", colors::organ(0)), ("misses it", MISSED), ("identified = true", PRIOR)]);
     Ok(plot.figure(&format!("<b>{name}</b>, 90% intervals.{legend}"))?)

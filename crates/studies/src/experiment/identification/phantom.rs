@@ -75,7 +75,7 @@ impl Phantom {
                 Posterior::apply(&truth, organ);
                 organ.material.model = MaterialModel::Corotated;
             });
-            let lifted: Option<Vec<_>> = held.lift(&ways, Pace::SLOW, progress)?.into_iter().collect();
+            let lifted: Option<Vec<_>> = held.lift(&ways, Pace::QUICK, progress)?.into_iter().collect();
             if let Some(lifted) = lifted {
                 let seen = |(number, (pull, lifted))| observed(&held, number, pull, lifted, random.stream(3));
                 let lifts = ways.iter().zip(&lifted).enumerate().map(seen).collect();

@@ -1,0 +1,61 @@
+//! `trocar identify`.
+
+use crate::cli::Identify;
+use crate::output;
+use trocar_core::Progress;
+use trocar_report::document::Table;
+use trocar_workflow::identify::{Identifying, IdentifyResult};
+use trocar_workflow::{Result, counted};
+
+pub fn run(arguments: &Identify, json: bool, progress: &dyn Progress) -> Result<()> {
+    let identifying = Identifying {
+        recording: arguments.recording.clone(),
+        specimen: arguments.specimen.clone(),
+        organ: arguments.organ.clone(),
+        lifts: arguments.lifts.clone(),
+        cell: 1e-3 * arguments.cell,
+        seed: arguments.seed,
+        threads: arguments.threads,
+    };
+    let result = identifying.run(&arguments.output, progress)?;
+    output::print(json, &result, text);
+    Ok(())
+}
+
+fn text(r: &IdentifyResult) -> String {
+    let number = |v: f64| if v.abs() >= 100.0 { format!("{v:.0}") } else { format!("{v:.3}") };
+    let table = Table::of(
+        &r.parameters,
+        &[
+            ("parameter", &|p| p.parameter.clone()),
+            ("5%", &|p| number(p.interval[0])),
+            ("median", &|p| number(p.interval[1])),
+            ("95%", &|p| number(p.interval[2])),
+            ("best", &|p| number(p.best)),
+            ("width/prior", &|p| format!("{:.2}", p.width)),
+            ("identified", &|p| if p.identified { "yes" } else { "no" }.to_owned()),
+        ],
+    );
+    let mut lines = vec![
+        format!(
+            "{}: {} with {} seen; {} values simulated on {} nodes, {} diverged",
+            r.organ,
+            counted(r.lifts.len(), "lift"),
+            counted(r.landmarks, "landmark"),
+            r.simulated,
+            r.nodes,
+            r.diverged
+        ),
+        table.text().trim_end().to_owned(),
+    ];
+    let mm = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.2} mm"));
+    lines.push(format!(
+        "landmark error of these lifts {} with the best values, {} as reconstructed; the model is off by {:.1}% of a lift",
+        mm(r.landmark_rmse_mm),
+        mm(r.reconstructed_rmse_mm),
+        100.0 * r.model_error
+    ));
+    lines.extend(r.notes.iter().map(|note| format!("note: {note}")));
+    lines.push(format!("specimen {} in {:.1} s; report {}", r.specimen, r.seconds, r.report));
+    lines.join("\n")
+}
