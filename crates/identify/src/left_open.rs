@@ -10,7 +10,7 @@ use trocar_specimen::{Parameter, Prior};
 /// Deviation of the organ coordinate up to which the base is held: an edge of the mesh at random.
 const BASE: f64 = 0.01;
 /// Of the organ coordinate from which threads hold: these are an edge apart.
-const FROM: f64 = 0.03;
+const FROM: f64 = 0.05;
 /// Of their slack (m).
 const SLACK: f64 = 1.5e-3;
 /// Of the logarithm of their stiffness: tissue yields at the node where a thread begins, and less in

@@ -2,7 +2,8 @@
 //!
 //! A landmark is off by the tracker's noise, which is its own, and by the error of the model: its
 //! mesh, its law and its alignment. That error grows with the lift, is alike in neighbouring
-//! landmarks, and half of it is the same in all lifts. Its size is inferred with the parameters.
+//! landmarks, and most of it is the same in all lifts. Its size is inferred with the parameters. What
+//! a Gaussian process does not know is alike in the same way, and the same in all lifts.
 
 use crate::dense::Factor;
 use crate::emulator::Foretold;
@@ -69,8 +70,8 @@ impl Likelihood {
             let ((a, x, way_a), (b, y, way_b)) = (self.places[i], self.places[j]);
             let shared = if a == b { 1.0 } else { COMMON };
             let alike = (-(x - y).abs() / ALIKE).exp();
-            let own = if i == j { TRACKER * TRACKER + foretold.variance } else { 0.0 };
-            own + error * error * way_a * way_b * shared * alike
+            let own = if i == j { TRACKER * TRACKER } else { 0.0 };
+            own + (error * error * way_a * way_b * shared + foretold.variance) * alike
         };
         let Some(factor) = Factor::of(self.places.len(), covariance) else { return f64::NEG_INFINITY };
         let mut log = -1.5 * factor.log_determinant();

@@ -58,8 +58,7 @@ impl Observation {
     /// Root mean square error of the landmarks of a prediction (m).
     pub(crate) fn rmse(&self, predicted: &[f64]) -> f64 {
         let count = self.landmarks.len();
-        let squares: f64 =
-            self.measured()[..3 * count].iter().zip(predicted).map(|(m, p)| (m - p) * (m - p)).sum();
+        let squares: f64 = self.measured()[..3 * count].iter().zip(predicted).map(|(m, p)| (m - p) * (m - p)).sum();
         (squares / count.max(1) as f64).sqrt()
     }
 }

@@ -151,7 +151,20 @@ fn with_body(
     facts.covered = Some(check.covered);
     let name = info.name.clone();
     let view = OrganView { name: name.clone(), mask, depth_error: check.error, compared: check.compared, moving_share };
-    Ok((Organ { name, body, surface, material: info.material, pins: info.pins, threads: None, posterior: None, base, facts }, view))
+    Ok((
+        Organ {
+            name,
+            body,
+            surface,
+            material: info.material,
+            pins: info.pins,
+            threads: None,
+            posterior: None,
+            base,
+            facts,
+        },
+        view,
+    ))
 }
 
 /// Share of the pixels of `mask` with depth that move.

@@ -33,7 +33,9 @@ mod tissue;
 mod tissue_preset;
 mod variation;
 
-pub use anatomy::{FIELD, MaterialOverride, OrganOverride, PinEnd, PinRule, Source, SpecimenSource, TOUGHNESS, ThreadRule};
+pub use anatomy::{
+    FIELD, MaterialOverride, OrganOverride, PinEnd, PinRule, Source, SpecimenSource, TOUGHNESS, ThreadRule,
+};
 pub use builtin::{BUILTINS, Builtin};
 pub use camera::{CellCamera, Lens, View};
 pub use cell::{Arm, ArmModel, Controller, Drive, FRANKA_FR3, Frame, GravityError, Instrument, InstrumentKind, Side};
@@ -55,4 +57,6 @@ pub use task::{Gates, GraspDesignName, Safety, SafetyRules, Task};
 pub use task_name::TaskName;
 pub use tissue::{BackendName, LatticeLaw, ScheduleName, Support, SupportKind, Tissue, ToolContactKind};
 pub use tissue_preset::TissuePreset;
-pub use variation::{Distribution, Drawn, DrawnTissue, DrawnValue, Factor, Per, Specimens, Split, TissueSource, Variation, VariationSet};
+pub use variation::{
+    Distribution, Drawn, DrawnTissue, DrawnValue, Factor, Per, Specimens, Split, TissueSource, Variation, VariationSet,
+};

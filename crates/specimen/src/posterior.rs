@@ -1,7 +1,7 @@
 //! What lifts tell about an organ: a distribution over its support and its tissue.
 
-use crate::parameter::{Parameter, Scale};
 use crate::Organ;
+use crate::parameter::{Parameter, Scale};
 use serde::{Deserialize, Serialize};
 
 /// The score of the ends of a 90% interval of a normal distribution.
@@ -162,10 +162,7 @@ mod tests {
             landmark_rmse_mm: 1.2,
             mean: vec![0.5, -1.0],
             covariance: vec![vec![0.04, 0.03], vec![0.03, 0.8]],
-            parameters: vec![
-                prior(Parameter::BaseLength, [0.02, 0.4]),
-                prior(Parameter::YoungModulus, [2e3, 1e5]),
-            ],
+            parameters: vec![prior(Parameter::BaseLength, [0.02, 0.4]), prior(Parameter::YoungModulus, [2e3, 1e5])],
         };
         made.summarise();
         made

@@ -6,10 +6,10 @@ use crate::bench::{
 };
 use crate::experiment::{
     BackendsExperiment, BeamExperiment, ContactExperiment, ControllerGridExperiment, ConvergenceExperiment,
-    CutForceExperiment, ElementQualityExperiment, GraspDesignsExperiment, IdentificationExperiment, IntegratorsExperiment, LiftsExperiment,
-    MeshConvergenceExperiment, PortBudgetExperiment, PortRegraspExperiment, RandomActionsExperiment,
-    ReconstructionExperiment, RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment,
-    TruthCubeExperiment, WrenchExperiment,
+    CutForceExperiment, ElementQualityExperiment, GraspDesignsExperiment, IdentificationExperiment,
+    IntegratorsExperiment, LiftsExperiment, MeshConvergenceExperiment, PortBudgetExperiment, PortRegraspExperiment,
+    RandomActionsExperiment, ReconstructionExperiment, RobustnessExperiment, RolloutsExperiment, SettlingExperiment,
+    SimilarityExperiment, TruthCubeExperiment, WrenchExperiment,
 };
 use crate::study::{Entry, Of};
 

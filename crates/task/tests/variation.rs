@@ -4,8 +4,8 @@
 
 use std::sync::Arc;
 use trocar_cell::{Action, Setpoint};
-use trocar_scene::{Distribution, Factor, Scene, SpecimenSource, VariationSet};
-use trocar_specimen::Specimen;
+use trocar_scene::{Distribution, Factor, Scene, SpecimenSource, TissueSource, VariationSet};
+use trocar_specimen::{Parameter, Posterior, Prior, Specimen, Threads};
 use trocar_task::{Episode, EpisodeFile, Result, SpecimenSupply, policy, run};
 use trocar_testing::tube::{ONE_END, resection, two_tubes};
 
@@ -133,4 +133,55 @@ fn a_replay_draws_nothing() {
     let header = String::from_utf8(bytes[..end].to_vec()).unwrap().replace("\"version\":7", "\"version\":6");
     let said = EpisodeFile::parse(&[header.as_bytes(), &bytes[end..]].concat()).unwrap_err();
     assert!(said.contains("version 6; trocar-episode version 7 is read"), "{said}");
+}
+
+/// The tube with what lifts tell about it.
+fn identified() -> Specimen {
+    let mut specimen = two_tubes(ONE_END, 4e-3);
+    let prior = |name, range| Prior { name, range, interval: [0.0; 3], width: 0.0 };
+    let mut posterior = Posterior {
+        recording: "film".to_owned(),
+        lifts: vec![0],
+        landmark_rmse_mm: 1.0,
+        mean: vec![0.0, 0.3, 0.0],
+        covariance: vec![vec![0.04, 0.0, 0.0], vec![0.0, 0.2, 0.1], vec![0.0, 0.1, 0.3]],
+        parameters: vec![
+            prior(Parameter::BaseLength, [0.05, 0.3]),
+            prior(Parameter::ThreadsStiffness, [5.0, 2e4]),
+            prior(Parameter::YoungModulus, [3e3, 1e5]),
+        ],
+    };
+    posterior.summarise();
+    specimen.organs[0].threads = Some(Threads { from: 0.6, to: 1.0, slack_m: 2e-3, stiffness_n_m2: 100.0 });
+    specimen.organs[0].posterior = Some(posterior);
+    specimen
+}
+
+#[test]
+fn support_and_tissue_are_drawn_from_a_posterior_and_replayed() {
+    let mut scene = scene(VariationSet::None);
+    scene.variation.tissue = TissueSource::Posterior;
+    assert!(scene.variation.varies());
+    let specimen = identified();
+    let mut episode = Episode::new(&scene, &specimen, 1).unwrap();
+    let mut run =
+        |seed: u64| run(&mut episode, policy::named("random").unwrap().as_mut(), seed, &mut |_| true).unwrap();
+    let (one, other) = (run(1), run(2));
+    let value = |drawn: &trocar_scene::Drawn| drawn.tissue[&("tube".to_owned(), Parameter::YoungModulus)];
+    let [first, second] = [&one, &other].map(|r| value(r.summary.drawn.as_ref().unwrap()));
+    assert!(first != second && (3e3..1e5).contains(&first), "{first} {second}");
+    assert_eq!(run(1).file, one.file, "the same bits again");
+    // Its drawn values have their names, and give the scene its values.
+    let written: Scene = trocar_specimen::parse_toml(&one.file.header.scene).unwrap();
+    let arranged = written.with_drawn(&one.file.drawn().unwrap(), &specimen);
+    let organ = &arranged.organs["tube"];
+    assert_eq!(organ.material.young_modulus_pa, Some(first));
+    let threads = organ.threads.unwrap();
+    assert_eq!((threads.from, threads.slack_m), (0.6, 2e-3), "what is not drawn is the specimen's");
+    assert!(one.file.header.drawn.contains("\"tube.young_modulus_pa\" = "), "{}", one.file.header.drawn);
+    assert_eq!(one.file.drawn().unwrap(), one.summary.drawn.clone().unwrap());
+    assert!(one.file.verify(&written, &specimen, 2, &mut || true).unwrap().same);
+    // Without a posterior there is nothing to draw from.
+    let said = Episode::new(&scene, &two_tubes(ONE_END, 4e-3), 1).err().unwrap().to_string();
+    assert!(said.contains("has a posterior to draw from; make one with `trocar identify`"), "{said}");
 }

@@ -51,20 +51,16 @@ fn a_bar_hangs_by_threads_as_in_the_oracle() {
         let (model, threads) = hanging(Backend::Tetrahedra, stiffness);
         let exact: Vec<ExactTether> = threads
             .iter()
-            .map(|t| ExactTether {
-                body: 0,
-                node: t.node,
-                anchor: t.anchor,
-                length: t.length,
-                stiffness: t.stiffness,
-            })
+            .map(|t| ExactTether { body: 0, node: t.node, anchor: t.anchor, length: t.length, stiffness: t.stiffness })
             .collect();
         let mut oracle = Oracle::new(&model).with_tethers(&exact).unwrap();
         let mut equilibrium = OracleState::new(&model);
         oracle.settle(&model, &mut equilibrium, &[]).unwrap();
         let found = rest(&model);
-        let (off, moved) =
-            (apart(&found, equilibrium.positions(0)), apart(model.bodies()[0].rest_positions(), equilibrium.positions(0)));
+        let (off, moved) = (
+            apart(&found, equilibrium.positions(0)),
+            apart(model.bodies()[0].rest_positions(), equilibrium.positions(0)),
+        );
         println!("{stiffness} N/m: {:.3} mm off of {:.2} mm", 1e3 * off, 1e3 * moved);
         assert!(off < 0.02 * moved, "{stiffness} N/m: {off} m of {moved} m");
     }
@@ -79,7 +75,8 @@ fn the_lattice_hangs_by_the_same_threads() {
     });
     let exact = rest(&hanging(Backend::Tetrahedra, 200.0).0).iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
     println!("lowest node: loose {loose}, held {held}, tetrahedra {exact}");
-    assert!(held > loose + 2e-3 && (held - exact).abs() < 0.4e-3);
+    // The bar itself is softer there.
+    assert!(held > loose + 10e-3 && (held - exact).abs() < 1e-3);
 }
 
 #[test]
@@ -87,7 +84,8 @@ fn threads_of_no_surface_are_refused() {
     let mesh = block([3, 3, 3], 2e-3);
     let middle = mesh.vertices.iter().position(|p| p.distance(DVec3::splat(2e-3)) < 1e-6).unwrap() as u32;
     let mut builder = ModelBuilder::new();
-    let description = BodyDescription { name: "cube".into(), mesh: &mesh, material: tissue(5e3), pinned: vec![0], supports: vec![] };
+    let description =
+        BodyDescription { name: "cube".into(), mesh: &mesh, material: tissue(5e3), pinned: vec![0], supports: vec![] };
     builder.body(description).unwrap();
     let thread = Tether { node: middle, anchor: DVec3::ZERO, length: 0.01, stiffness: 1.0 };
     let refused = |builder: &mut ModelBuilder, index: usize, thread: Tether| {

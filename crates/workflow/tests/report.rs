@@ -101,8 +101,8 @@ fn organ(name: &str, centre: DVec3, radii: DVec3, color: [u8; 3], cells: i32) ->
         material: Material::default(),
         pins: Pins::None,
         base: centre,
-threads: None,
-posterior: None,
+        threads: None,
+        posterior: None,
         facts,
     }
 }

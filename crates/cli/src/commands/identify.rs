@@ -4,7 +4,7 @@ use crate::cli::Identify;
 use crate::output;
 use trocar_core::Progress;
 use trocar_report::document::Table;
-use trocar_workflow::identify::{Identifying, IdentifyResult};
+use trocar_workflow::identify::{IdentifyResult, Identifying};
 use trocar_workflow::{Result, counted};
 
 pub fn run(arguments: &Identify, json: bool, progress: &dyn Progress) -> Result<()> {

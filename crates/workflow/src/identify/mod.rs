@@ -232,7 +232,9 @@ fn said(found: &Identified, forces: bool) -> Vec<String> {
         let alone = if forces { "by these lifts" } else { "by geometry alone; a measured force (force_n) would tell" };
         lines.push(format!("stiffness not identified {alone}"));
     } else if !forces {
-        lines.push("no force was measured: the organ's weight, with its density, sets the scale of stiffness".to_owned());
+        lines.push(
+            "no force was measured: the organ's weight, with its density, sets the scale of stiffness".to_owned(),
+        );
     }
     lines
 }

@@ -30,10 +30,22 @@ pub(super) fn document(r: &IdentifyResult, found: &Identified) -> Result<Documen
     let mm = |v: Option<f64>| format!("{} mm", or_dash(v, 2));
     let identified = r.parameters.iter().filter(|p| p.identified).count();
     let cards = vec![
-        Card::new("Identified", format!("{identified} of {}", r.parameters.len()), "90% interval at most half the prior's"),
+        Card::new(
+            "Identified",
+            format!("{identified} of {}", r.parameters.len()),
+            "90% interval at most half the prior's",
+        ),
         Card::new("Landmark error", mm(r.landmark_rmse_mm), "of these lifts, with the best values"),
-        Card::new("As reconstructed", mm(r.reconstructed_rmse_mm), "the same with the reconstruction's pins and material"),
-        Card::new("Model's error", format!("{}%", fixed(1e2 * r.model_error, 1)), "of the lift; inferred with the rest"),
+        Card::new(
+            "As reconstructed",
+            mm(r.reconstructed_rmse_mm),
+            "the same with the reconstruction's pins and material",
+        ),
+        Card::new(
+            "Model's error",
+            format!("{}%", fixed(1e2 * r.model_error, 1)),
+            "of the lift; inferred with the rest",
+        ),
     ];
     let section = Section::new("Identification", lead).cards(cards).table(table(found)).lines(r.notes.clone());
     let plots = found.posterior.parameters.iter().enumerate().map(|(k, prior)| plot(found, k, prior));

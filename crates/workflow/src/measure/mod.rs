@@ -155,7 +155,9 @@ pub fn measure_recording(recording: &Recording, progress: &dyn Progress) -> Resu
     }
     let mut masks: Vec<(Mask, Option<[f64; 2]>, &str)> = Vec::new();
     for organ in &recording.info.organs {
-        masks.extend(trocar_reconstruct::drawn_mask(recording, organ)?.map(|mask| (mask, organ.base_px, organ.name.as_str())));
+        masks.extend(
+            trocar_reconstruct::drawn_mask(recording, organ)?.map(|mask| (mask, organ.base_px, organ.name.as_str())),
+        );
     }
     let organ = |lift: &LiftInfo| {
         let [u, v] = lift.click.map(|c| c.round() as usize);

@@ -66,7 +66,8 @@ impl Study for IdentificationExperiment {
             fits.extend([("coarser", COARSER_MM, false), ("forces", CELL_MM, true)]);
         }
         let seeds = self.seed..self.seed + self.count;
-        let trial = |seed: u64| fits.iter().map(move |(_, cell_mm, forces)| Trial { seed, cell_mm: *cell_mm, forces: *forces });
+        let trial =
+            |seed: u64| fits.iter().map(move |(_, cell_mm, forces)| Trial { seed, cell_mm: *cell_mm, forces: *forces });
         let trials: Vec<Trial> = seeds.flat_map(trial).collect();
         let folder = job.output().join("phantoms");
         let key = |t: &Trial| format!("phantom {}, {} mm, forces {}", t.seed, t.cell_mm, t.forces);

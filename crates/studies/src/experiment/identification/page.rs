@@ -42,8 +42,12 @@ fn cards(r: &IdentificationResult) -> Vec<Card> {
     );
     let met = r.landmark_rmse_mm.zip(bar).is_some_and(|(error, bar)| error <= bar);
     vec![
-        Card::new("Covered", format!("{} of 6", r.covered), "parameters whose 90% interval holds 80% or more of truths")
-            .met(r.covered == 6),
+        Card::new(
+            "Covered",
+            format!("{} of 6", r.covered),
+            "parameters whose 90% interval holds 80% or more of truths",
+        )
+        .met(r.covered == 6),
         Card::new("Landmark error", mm(r.landmark_rmse_mm), note).met(met),
     ]
 }
@@ -94,13 +98,15 @@ fn intervals(r: &IdentificationResult, parameter: Parameter) -> Result<String> {
             let x = scaled(p.truth);
             let color = if p.holds { colors::organ(0) } else { MISSED };
             lines.push(Line::new(vec![(x, scaled(p.interval[0])), (x, scaled(p.interval[2]))], color));
-            let [left, right] = if log { [x / 1.02, x * 1.02] } else { [x - 0.006 * (high - low), x + 0.006 * (high - low)] };
+            let [left, right] =
+                if log { [x / 1.02, x * 1.02] } else { [x - 0.006 * (high - low), x + 0.006 * (high - low)] };
             lines.push(Line::new(vec![(left, scaled(p.interval[1])), (right, scaled(p.interval[1]))], color));
         }
     }
     let unit = if unit.is_empty() { String::new() } else { format!(" ({unit})") };
     let (x, y) = (format!("true {name}{unit}"), format!("identified{unit}"));
-    let plot = Plot { title: name, x: &x, y: &y, lines, show: vec![low, high], log_x: log, log_y: log, ..Plot::default() };
+    let plot =
+        Plot { title: name, x: &x, y: &y, lines, show: vec![low, high], log_x: log, log_y: log, ..Plot::default() };
     let legend =
         page::legend([("holds the truth", colors::organ(0)), ("misses it", MISSED), ("identified = true", PRIOR)]);
     Ok(plot.figure(&format!("<b>{name}</b>, 90% intervals.{legend}"))?)

@@ -121,7 +121,8 @@ impl Phantom {
             let organ = organ.with(change);
             let pulls: Vec<Pull> = judged.iter().map(|lift| lift.pull).collect();
             let lifted = organ.lift(&pulls, Pace::QUICK, progress)?;
-            let each = judged.iter().zip(&lifted).map(|(lift, lifted)| Some(1e3 * lift.error(&organ, lifted.as_ref()?)));
+            let each =
+                judged.iter().zip(&lifted).map(|(lift, lifted)| Some(1e3 * lift.error(&organ, lifted.as_ref()?)));
             Ok(trocar_core::median(each.flatten().collect::<Vec<_>>()))
         };
         Ok(FitRow {
@@ -142,9 +143,7 @@ impl Phantom {
                 (organ.pins, organ.threads) = (OWN_PINS, None);
                 organ.material.young_modulus_pa = OWN_MODULUS;
             })?,
-            lift_mm: trocar_core::median(
-                judged.iter().map(|l| 1e3 * l.pull.displacement.length()).collect::<Vec<_>>(),
-            ),
+            lift_mm: trocar_core::median(judged.iter().map(|l| 1e3 * l.pull.displacement.length()).collect::<Vec<_>>()),
         })
     }
 }

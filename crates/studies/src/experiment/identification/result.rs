@@ -130,8 +130,9 @@ pub(super) fn coverage(fit: &str, rows: &[&FitRow]) -> Vec<CoverageRow> {
 
 /// Errors over the rows of a fit.
 pub(super) fn errors(fit: &str, rows: &[&FitRow]) -> ErrorRow {
-    let middle =
-        |of: &dyn Fn(&FitRow) -> Option<f64>| trocar_core::median(rows.iter().filter_map(|r| of(r)).collect::<Vec<_>>());
+    let middle = |of: &dyn Fn(&FitRow) -> Option<f64>| {
+        trocar_core::median(rows.iter().filter_map(|r| of(r)).collect::<Vec<_>>())
+    };
     ErrorRow {
         fit: fit.to_owned(),
         fitted_rmse_mm: middle(&|r| Some(r.fitted_rmse_mm)),

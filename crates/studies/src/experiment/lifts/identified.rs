@@ -27,18 +27,22 @@ pub(super) fn identified(
         threads: 1,
     };
     let found = identification.run(progress)?;
-    let error = |values: &[(trocar_specimen::Parameter, f64)], threads: bool| -> Result<Vec<Option<[Option<f64>; 2]>>> {
-        let organ = appendix.with(|organ| {
-            Posterior::apply(values, organ);
-            organ.threads = organ.threads.filter(|_| threads);
-        });
-        let pulls: Vec<_> = judged.iter().map(|(_, lift)| lift.pull(Grip::Place)).collect();
-        let lifted = organ.lift(&pulls, Pace::SLOW, progress)?;
-        Ok(judged.iter().zip(&lifted).map(|((_, lift), l)| l.as_ref().map(|l| lift.compared(&organ, l))).collect())
-    };
+    let error =
+        |values: &[(trocar_specimen::Parameter, f64)], threads: bool| -> Result<Vec<Option<[Option<f64>; 2]>>> {
+            let organ = appendix.with(|organ| {
+                Posterior::apply(values, organ);
+                organ.threads = organ.threads.filter(|_| threads);
+            });
+            let pulls: Vec<_> = judged.iter().map(|(_, lift)| lift.pull(Grip::Place)).collect();
+            let lifted = organ.lift(&pulls, Pace::SLOW, progress)?;
+            Ok(judged.iter().zip(&lifted).map(|((_, lift), l)| l.as_ref().map(|l| lift.compared(&organ, l))).collect())
+        };
     let (held, loose) = (error(&found.best, true)?, error(&found.best, false)?);
     let mm = |e: Option<f64>| e.map(|m| 1e3 * m);
-    let row = |((number, lift), (held, loose)): (&&(usize, SeenLift), (&Option<[Option<f64>; 2]>, &Option<[Option<f64>; 2]>))| {
+    let row = |((number, lift), (held, loose)): (
+        &&(usize, SeenLift),
+        (&Option<[Option<f64>; 2]>, &Option<[Option<f64>; 2]>),
+    )| {
         let [rmse, chamfer] = held.unwrap_or_default();
         JudgedRow {
             lift: *number,

@@ -104,9 +104,14 @@ impl Study for LiftsExperiment {
             job.trials("lifts", &settings, &trials, Trial::key, self.threads, |trial, progress| {
                 trial.run(&appendix, progress)
             })?;
-        let folds = job.trials("identification", &settings, &[0, 1], |fold| format!("fold {fold}"), self.threads, |fold, progress| {
-            identified(*fold, &appendix, &reproduced, progress)
-        })?;
+        let folds = job.trials(
+            "identification",
+            &settings,
+            &[0, 1],
+            |fold| format!("fold {fold}"),
+            self.threads,
+            |fold, progress| identified(*fold, &appendix, &reproduced, progress),
+        )?;
         let identified = IdentifiedSummary::of(folds.rows);
         let (trend, errors) = (trend(&rows), errors(&rows));
         let chosen = errors.iter().find(|e| e.support == Support::Specimen.name() && e.modulus_kpa == 1e-3 * own);
