@@ -110,7 +110,7 @@ impl Identification {
                 asked = (0..count * self.priors.len()).map(|i| draws[one(i)][..self.priors.len()].to_vec()).collect();
             }
         }
-        self.conclude(&points, &likelihood, draws, [simulated, diverged])
+        self.conclude(&points, &likelihood, &draws, [simulated, diverged])
     }
 
     /// Points that cover the prior evenly: a Latin hypercube.
@@ -176,7 +176,8 @@ impl Identification {
             let scores = point.scores.iter().enumerate().map(|(d, s)| s + jitter(d));
             scores.chain([0.3 * own.normal(99)]).collect()
         };
-        Ok(walk((0..WALKERS).map(start).collect(), WALK, random, log))
+        let starts: Vec<Vec<f64>> = (0..WALKERS).map(start).collect();
+        Ok(walk(&starts, WALK, random, log))
     }
 
     /// Logarithm of the posterior at a simulated point with the likeliest error of the model.
@@ -191,7 +192,7 @@ impl Identification {
         &self,
         points: &[Point],
         likelihood: &Likelihood,
-        draws: Vec<Vec<f64>>,
+        draws: &[Vec<f64>],
         [simulated, diverged]: [usize; 2],
     ) -> Result<Identified> {
         let count = draws.len() as f64;

@@ -9,12 +9,12 @@ const STRETCH: f64 = 2.0;
 /// The last places of the walkers of an ensemble that began at `starts`, kept every `thin` rounds
 /// after `warm` rounds until `rounds` are over.
 pub(crate) fn walk(
-    starts: Vec<Vec<f64>>,
+    starts: &[Vec<f64>],
     [warm, rounds, thin]: [usize; 3],
     random: Random,
     log_density: impl Fn(&[f64]) -> f64,
 ) -> Vec<Vec<f64>> {
-    let (mut places, count) = (starts.clone(), starts.len());
+    let (mut places, count) = (starts.to_vec(), starts.len());
     let mut logs: Vec<f64> = places.iter().map(|p| log_density(p)).collect();
     let mut kept = Vec::new();
     let half = count / 2;
@@ -48,10 +48,10 @@ mod tests {
     #[test]
     fn a_slanted_normal_distribution_is_drawn() {
         let random = Random::from_keys(&[5]);
-        let starts = (0..24).map(|i| (0..2).map(|k| random.stream(k).normal(i)).collect()).collect();
+        let starts: Vec<Vec<f64>> = (0..24).map(|i| (0..2).map(|k| random.stream(k).normal(i)).collect()).collect();
         // x of deviation 1, y = 3 x + 0.1 normal.
         let log = |p: &[f64]| -0.5 * (p[0] * p[0] + (p[1] - 3.0 * p[0]) * (p[1] - 3.0 * p[0]) / 0.01);
-        let kept = walk(starts, [200, 1200, 5], random.stream(9), log);
+        let kept = walk(&starts, [200, 1200, 5], random.stream(9), log);
         let mean = |f: &dyn Fn(&Vec<f64>) -> f64| kept.iter().map(f).sum::<f64>() / kept.len() as f64;
         assert!(mean(&|p| p[0]).abs() < 0.15, "{}", mean(&|p| p[0]));
         assert!((mean(&|p| p[0] * p[0]) - 1.0).abs() < 0.25);

@@ -82,12 +82,13 @@ impl Posterior {
                 return Err(format!("parameter '{name}' is there twice; it must be there once"));
             }
             let [least, most] = prior.name.limits();
-            if !(least <= low && low < high && high <= most) {
+            let rises = least <= low && low < high && high <= most;
+            if !rises {
                 return Err(format!(
                     "parameter '{name}' has the range [{low}, {high}]; it must rise within [{least}, {most}]"
                 ));
             }
-            if !prior.interval.iter().all(|v| v.is_finite()) || !(prior.width >= 0.0 && prior.width.is_finite()) {
+            if !prior.interval.iter().chain([&prior.width]).all(|v| v.is_finite()) {
                 return Err(format!("parameter '{name}' has an interval or width that is no number"));
             }
         }

@@ -51,7 +51,7 @@ pub(super) fn document(r: &IdentifyResult, found: &Identified) -> Result<Documen
     let plots = found.posterior.parameters.iter().enumerate().map(|(k, prior)| plot(found, k, prior));
     let plots = plots.collect::<Result<Vec<_>>>()?;
     let said = "Probability density over each parameter, over its largest value: before the lifts, and after them.";
-    Ok(Document::new(&format!("Identified: {}", r.organ), "What lifts tell of support and tissue")
+    Ok(Document::new(format!("Identified: {}", r.organ), "What lifts tell of support and tissue")
         .with(section)
         .with(Section::new("Posterior", said).figures(plots)))
 }
