@@ -323,7 +323,7 @@ mod tests {
 
     #[test]
     fn the_window_is_centred_where_no_tissue_is_lifted() {
-        let lift = |rest, last| LiftInfo { rest, first: rest + 1, last, click: [0.0; 2] };
+        let lift = |rest, last| LiftInfo { force_n: None, rest, first: rest + 1, last, click: [0.0; 2] };
         assert_eq!(still_middle(&[], 100), 50);
         assert_eq!(still_middle(&[lift(60, 79), lift(80, 99)], 100), 30);
         assert_eq!(still_middle(&[lift(0, 9), lift(20, 29)], 100), 65);
