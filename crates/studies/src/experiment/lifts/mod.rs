@@ -118,9 +118,9 @@ impl Study for LiftsExperiment {
         let left: Vec<f64> = reproduced.iter().map(|(_, r)| 1e3 * r.left).collect();
         let result = LiftsResult {
             d50_residual_mm: residual(&trend, 1e-3 * own),
-            landmark_rmse_mm: chosen.and_then(|e| e.landmark_rmse_mm),
+            specimen_landmark_rmse_mm: chosen.and_then(|e| e.landmark_rmse_mm),
             chamfer_mm: chosen.and_then(|e| e.chamfer_mm),
-            held_out_landmark_rmse_mm: identified.landmark_rmse_mm,
+            landmark_rmse_mm: identified.landmark_rmse_mm,
             identified,
             landmark_floor_mm: summary.landmark_floor_mm,
             lift_mm: summary.lift_mm,

@@ -67,7 +67,7 @@ fn cards(r: &LiftsResult) -> Vec<Card> {
     );
     vec![
         Card::new("d50 residual", mm(r.d50_residual_mm), note).met(r.d50_residual_mm.is_some_and(|d| d <= BAR_MM)),
-        Card::new("Landmark error", mm(r.landmark_rmse_mm), landmarks),
+        Card::new("Landmark error", mm(r.specimen_landmark_rmse_mm), landmarks),
         held_out(r),
         Card::new("Local Chamfer", mm(r.chamfer_mm), "paper 4.3 mm"),
         Card::new("Tracking error", mm(r.tracking_error_mm_median), "median distance from the truth; bar 1.0 mm")
@@ -80,7 +80,7 @@ fn cards(r: &LiftsResult) -> Vec<Card> {
 /// floor and a tenth of the lift.
 fn held_out(r: &LiftsResult) -> Card {
     let bar = r.lift_mm.map(|lift| (0.1 * lift).max(1.5 * r.landmark_floor_mm.unwrap_or(0.0)));
-    let error = r.held_out_landmark_rmse_mm;
+    let error = r.landmark_rmse_mm;
     let note = format!(
         "lifts that were not fitted, identified support; without its threads {} mm; bar {} mm",
         or_dash(r.identified.without_threads_mm, 2),
@@ -255,14 +255,14 @@ mod tests {
         };
         let result = LiftsResult {
             d50_residual_mm: residual(&trend, 12.0),
-            landmark_rmse_mm: errors[0].landmark_rmse_mm,
+            specimen_landmark_rmse_mm: errors[0].landmark_rmse_mm,
             landmark_floor_mm: Some(0.1),
             lift_mm: Some(20.0),
             static_rmse_mm: Some(9.0),
             rigid_rmse_mm: Some(6.0),
             tracking_error_mm_median: Some(0.4),
             chamfer_mm: Some(3.0),
-            held_out_landmark_rmse_mm: Some(1.2),
+            landmark_rmse_mm: Some(1.2),
             identified: IdentifiedSummary::of(Vec::new()),
             alignment_mm: Some(1.0),
             recorded_line: None,

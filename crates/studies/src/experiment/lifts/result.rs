@@ -140,10 +140,10 @@ pub struct LiftsResult {
     pub d50_residual_mm: Option<f64>,
     /// Median landmark error of the reproduced lifts, with the specimen's own pins and modulus
     /// (mm).
-    pub landmark_rmse_mm: Option<f64>,
+    pub specimen_landmark_rmse_mm: Option<f64>,
     /// Median landmark error of lifts that were not fitted, with the support and the tissue that
     /// are identified from the other half of the lifts (mm).
-    pub held_out_landmark_rmse_mm: Option<f64>,
+    pub landmark_rmse_mm: Option<f64>,
     /// What is identified.
     pub identified: IdentifiedSummary,
     /// Median landmark difference between two frames at the peak (mm).
