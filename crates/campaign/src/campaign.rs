@@ -74,7 +74,7 @@ pub struct Campaign {
     /// The set of factors that vary between episodes, instead of the scene's. Without one, a scene
     /// that has no set varies by [`DEFAULT_VARIATION`].
     pub variation: Option<VariationSet>,
-    /// Where support and tissue of organs come from, instead of what the scene says.
+    /// The source of the organs' support and tissue, instead of the scene's.
     pub tissue: Option<TissueSource>,
     /// What bears the tissue, instead of the scene's backend.
     pub backend: Option<BackendName>,

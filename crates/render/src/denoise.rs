@@ -24,8 +24,8 @@ const NORMAL_DOUBLINGS: u32 = 6;
 /// Least albedo by which light is divided.
 const MIN_ALBEDO: f32 = 0.02;
 
-/// A weight falls as the sixteenth power of one less than this share of what is off: nearly an
-/// exponential, with the same bits on any machine.
+/// A weight is (1 - this times the difference) to the power of 16. That is nearly an exponential, and
+/// it has the same bits on any machine.
 const FALLOFF: f32 = 1.0 / 16.0;
 
 /// What the paths of a pixel saw first, on average, and what they carried.

@@ -86,11 +86,6 @@ impl Parameter {
         }
     }
 
-    /// Whether it is of what holds the organ, and not of its tissue.
-    pub fn is_of_support(self) -> bool {
-        !matches!(self, Self::YoungModulus | Self::PoissonRatio)
-    }
-
     /// The widest range that it may have.
     pub fn limits(self) -> [f64; 2] {
         match self {

@@ -3,7 +3,6 @@
 use crate::cli::Identify;
 use crate::output;
 use trocar_core::Progress;
-use trocar_report::document::Table;
 use trocar_workflow::identify::{IdentifyResult, Identifying};
 use trocar_workflow::{Result, counted};
 
@@ -23,19 +22,6 @@ pub fn run(arguments: &Identify, json: bool, progress: &dyn Progress) -> Result<
 }
 
 fn text(r: &IdentifyResult) -> String {
-    let number = |v: f64| if v.abs() >= 100.0 { format!("{v:.0}") } else { format!("{v:.3}") };
-    let table = Table::of(
-        &r.parameters,
-        &[
-            ("parameter", &|p| p.parameter.clone()),
-            ("5%", &|p| number(p.interval[0])),
-            ("median", &|p| number(p.interval[1])),
-            ("95%", &|p| number(p.interval[2])),
-            ("best", &|p| number(p.best)),
-            ("width/prior", &|p| format!("{:.2}", p.width)),
-            ("identified", &|p| if p.identified { "yes" } else { "no" }.to_owned()),
-        ],
-    );
     let mut lines = vec![
         format!(
             "{}: {} with {} seen; {} values simulated on {} nodes, {} diverged",
@@ -46,7 +32,7 @@ fn text(r: &IdentifyResult) -> String {
             r.nodes,
             r.diverged
         ),
-        table.text().trim_end().to_owned(),
+        r.table().text().trim_end().to_owned(),
     ];
     let mm = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.2} mm"));
     lines.push(format!(

@@ -38,8 +38,8 @@ pub struct Identifying {
 /// One parameter.
 #[derive(Clone, Debug, Serialize)]
 pub struct ParameterFigures {
-    /// Its name.
-    pub parameter: String,
+    /// Which it is.
+    pub parameter: Parameter,
     /// The range of the prior.
     pub range: [f64; 2],
     /// The 5%, 50% and 95% quantiles.
@@ -203,7 +203,7 @@ fn error_of(organ: &LoneOrgan, seen: &[(usize, SeenLift)], progress: &dyn Progre
 
 fn parameters(found: &Identified) -> Vec<ParameterFigures> {
     let figures = |(prior, (_, best)): (&trocar_specimen::Prior, &(Parameter, f64))| ParameterFigures {
-        parameter: prior.name.name().to_owned(),
+        parameter: prior.name,
         range: prior.range,
         interval: prior.interval,
         best: *best,

@@ -1,6 +1,6 @@
 //! The page of an identified specimen: the posterior as plots.
 
-use super::IdentifyResult;
+use super::{IdentifyResult, ParameterFigures};
 use crate::Result;
 use trocar_identify::Identified;
 use trocar_report::colors;
@@ -47,7 +47,7 @@ pub(super) fn document(r: &IdentifyResult, found: &Identified) -> Result<Documen
             "of the lift; inferred with the rest",
         ),
     ];
-    let section = Section::new("Identification", lead).cards(cards).table(table(found)).lines(r.notes.clone());
+    let section = Section::new("Identification", lead).cards(cards).table(r.table()).lines(r.notes.clone());
     let plots = found.posterior.parameters.iter().enumerate().map(|(k, prior)| plot(found, k, prior));
     let plots = plots.collect::<Result<Vec<_>>>()?;
     let said = "Probability density over each parameter, over its largest value: before the lifts, and after them.";
@@ -56,23 +56,19 @@ pub(super) fn document(r: &IdentifyResult, found: &Identified) -> Result<Documen
         .with(Section::new("Posterior", said).figures(plots)))
 }
 
-fn table(found: &Identified) -> Table {
-    let head = ["Parameter", "Unit", "Prior", "5%", "Median", "95%", "Best", "Width over the prior's"];
-    let row = |(prior, (_, best)): (&Prior, &(trocar_specimen::Parameter, f64))| {
-        let (name, unit, factor) = prior.name.said();
-        let number = |v: f64| fixed(factor * v, if (factor * v).abs() >= 10.0 { 0 } else { 2 });
-        vec![
-            name.to_owned(),
-            unit.to_owned(),
-            format!("{} to {}", number(prior.range[0]), number(prior.range[1])),
-            number(prior.interval[0]),
-            number(prior.interval[1]),
-            number(prior.interval[2]),
-            number(*best),
-            fixed(prior.width, 2),
-        ]
-    };
-    Table::new(head, found.posterior.parameters.iter().zip(&found.best).map(row).collect())
+impl IdentifyResult {
+    /// The parameters, in units for people.
+    pub fn table(&self) -> Table {
+        let head = ["Parameter", "Unit", "Prior", "5%", "Median", "95%", "Best", "Width over the prior's"];
+        let row = |p: &ParameterFigures| {
+            let (name, unit, factor) = p.parameter.said();
+            let number = |v: f64| fixed(factor * v, if (factor * v).abs() >= 10.0 { 0 } else { 2 });
+            let prior = format!("{} to {}", number(p.range[0]), number(p.range[1]));
+            let [low, median, high] = p.interval.map(number);
+            [name.to_owned(), unit.to_owned(), prior, low, median, high, number(p.best), fixed(p.width, 2)].to_vec()
+        };
+        Table::new(head, self.parameters.iter().map(row).collect())
+    }
 }
 
 /// The densities of one parameter.

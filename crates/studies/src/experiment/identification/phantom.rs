@@ -33,8 +33,8 @@ const LEAN: f64 = 0.2;
 const LANDMARKS: f64 = 5e-3;
 const HIDDEN: f64 = 5e-3;
 
-/// Deviations of what is measured: a landmark along an axis (m), the way of the grasp along an axis
-/// (m), and its place along the organ (m).
+/// Standard deviations of the measurement: of a landmark along an axis, of the grasp's motion along
+/// an axis, and of its place along the organ (m).
 pub(super) const TRACKER: f64 = 0.25e-3;
 const WAY: f64 = 0.3e-3;
 const PLACE: f64 = 1e-3;
