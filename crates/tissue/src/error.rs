@@ -17,4 +17,8 @@ pub enum Error {
     /// A parameter of the whole model is unusable.
     #[error("{0}")]
     Model(String),
+    /// A graphics card that is missing, too small, or lost.
+    #[cfg(feature = "gpu")]
+    #[error("{0}")]
+    Gpu(String),
 }

@@ -80,6 +80,8 @@ mod threads;
 mod untangle;
 
 pub use backend::{Backend, LatticeSettings, Law};
+#[cfg(feature = "gpu")]
+pub use batch::GpuBatch;
 pub use batch::{Batch, BatchSettings, Instance, InstanceReport};
 pub use body::Body;
 pub use builder::{BodyDescription, MassFloor, ModelBuilder};

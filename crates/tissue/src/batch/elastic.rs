@@ -14,10 +14,10 @@ use glam::DMat3;
 use trocar_lattice::Material;
 
 /// Volume ratio below which the barrier of the limits may act.
-const LIMITED_RATIO: f32 = 0.2;
+pub(super) const LIMITED_RATIO: f32 = 0.2;
 
 /// |F|^2 above which the limit of stretch may act.
-const LIMITED_SQUARE: f32 = 16.0;
+pub(super) const LIMITED_SQUARE: f32 = 16.0;
 
 /// Nine numbers of a matrix, column by column.
 type Nine<S> = [Reg<S>; 9];

@@ -22,23 +22,23 @@ const MAX_RANK: usize = 3 * MAX_POINTS;
 
 /// A spring of a grasp.
 #[derive(Clone, Debug)]
-struct Spring {
-    nodes: [u32; 8],
-    weights: [f32; 8],
+pub(super) struct Spring {
+    pub nodes: [u32; 8],
+    pub weights: [f32; 8],
     /// Where the point rests (m).
     rest: DVec3,
     /// Where the point was when the grasp began (m).
     captured: DVec3,
     /// Stiffness over Young's modulus times the edge of a cell.
-    stiffness: f32,
+    pub stiffness: f32,
     /// Displacement of the point (cells) where the spring has no force.
-    target: [f32; 3],
+    pub target: [f32; 3],
 }
 
 /// One instance's grasp.
 #[derive(Clone, Debug)]
-struct LaneGrasp {
-    springs: Vec<Spring>,
+pub(super) struct LaneGrasp {
+    pub springs: Vec<Spring>,
     /// The tool, in the organ's frame, when the grasp began.
     captured_at: Pose,
     /// Whether all targets are finite.
@@ -47,14 +47,14 @@ struct LaneGrasp {
 
 /// The grasps of a group.
 pub(super) struct Grasps {
-    lanes: [LaneGrasp; BLOCK],
+    pub lanes: [LaneGrasp; BLOCK],
     /// Axes of the points of the grasp that has most.
     rank: usize,
     /// Motion of the nodes under a unit force at each axis, with the stiffness of the factor: node
     /// by node, axis by axis.
     response: Vec<[Block<f32>; 3]>,
     /// Forces at the axes by the motions there without the grasp, column by column.
-    resistance: Vec<[Block<f32>; MAX_RANK]>,
+    pub resistance: Vec<[Block<f32>; MAX_RANK]>,
 }
 
 impl Grasps {

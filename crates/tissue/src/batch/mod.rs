@@ -13,11 +13,16 @@
 
 mod elastic;
 mod factor;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod grasps;
 mod group;
 mod search;
 mod topology;
 mod warp;
+
+#[cfg(feature = "gpu")]
+pub use gpu::GpuBatch;
 
 use crate::registers::BLOCK;
 use crate::{Error, Isa, Result, ToolMotion};
@@ -195,14 +200,7 @@ impl Batch {
     /// # Errors
     /// [`Error::Model`] for another number of tools than of instances.
     pub fn step(&mut self, tools: &[ToolMotion]) -> Result<Vec<InstanceReport>> {
-        let count = self.len();
-        if tools.len() != count {
-            let given = tools.len();
-            return Err(Error::Model(format!(
-                "there are {given} motions of tools for the {count} instances of '{}'; give one for each",
-                self.name
-            )));
-        }
+        self.check_tools(tools)?;
         let Self { level, topology, factors, schedule, instances, seated, groups, scratch, pool, .. } = self;
         let reports: Vec<_> = pool.install(|| {
             let step = |(group, seated): (&mut Group, &Vec<usize>)| {
@@ -327,6 +325,17 @@ impl Batch {
     /// Young's moduli of the factors (Pa), one for instances of similar moduli.
     pub fn factor_moduli(&self) -> Vec<f64> {
         self.factors.iter().map(|f| f.young_modulus).collect()
+    }
+
+    fn check_tools(&self, tools: &[ToolMotion]) -> Result<()> {
+        let (given, count) = (tools.len(), self.len());
+        if given == count {
+            return Ok(());
+        }
+        Err(Error::Model(format!(
+            "there are {given} motions of tools for the {count} instances of '{}'; give one for each",
+            self.name
+        )))
     }
 
     fn seat(&self, instance: usize) -> Result<(usize, usize)> {

@@ -17,23 +17,23 @@ use crate::registers::{BLOCK, Block, Mask, Reg, bits, lanes, load, part_of, spla
 use fearless_simd::{Select, Simd, SimdBase, SimdMask};
 
 /// Pairs of steps and changes of the gradient that are kept.
-const MEMORY: usize = 6;
+pub(super) const MEMORY: usize = 6;
 
 /// A step is too long if the slope at its end is more than this share of the slope at its
 /// beginning, upwards.
-const OVERSHOOT: f32 = 0.6;
+pub(super) const OVERSHOOT: f32 = 0.6;
 
 /// Shortening of a step that is too long, at least and at most.
-const SHORTENED: [f32; 2] = [0.1, 0.7];
+pub(super) const SHORTENED: [f32; 2] = [0.1, 0.7];
 
 /// Rejected steps in a row after which a lane gives up.
-const MAX_REJECTED: f32 = 12.0;
+pub(super) const MAX_REJECTED: f32 = 12.0;
 
 /// Volume over rest volume that a cell keeps: no step goes below it, unless it was lower before.
-const MIN_RATIO: f32 = 0.01;
+pub(super) const MIN_RATIO: f32 = 0.01;
 
 /// Least curvature along a step that is kept, over the slope at its beginning.
-const MIN_CURVATURE: f32 = 1e-4;
+pub(super) const MIN_CURVATURE: f32 = 1e-4;
 
 /// A step and the change of the gradient along it.
 struct Pair {

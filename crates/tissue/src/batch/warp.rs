@@ -15,7 +15,7 @@ use fearless_simd::{Select, Simd, SimdBase, SimdFloat};
 const ROUNDS: usize = 3;
 
 /// Volume ratio below which a neighbourhood is not turned.
-const MIN_RATIO: f32 = 0.05;
+pub(super) const MIN_RATIO: f32 = 0.05;
 
 /// Rotations by node, each by columns.
 pub(super) type Rotations = Vec<[Block<f32>; 9]>;

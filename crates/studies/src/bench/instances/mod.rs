@@ -1,6 +1,8 @@
 //! Many instances of one lattice in SIMD lanes, beside the fastest way to step one alone.
 
 mod alone;
+#[cfg(feature = "gpu")]
+mod card;
 mod page;
 mod scene;
 
@@ -12,7 +14,7 @@ use crate::{Error, Result};
 use alone::Alone;
 use clap::Args;
 use glam::DVec3;
-use scene::{GRIP, Scene};
+use scene::{FILL, GRIP, Scene};
 use serde::Serialize;
 use std::time::Instant;
 use trocar_core::Progress;
@@ -51,9 +53,15 @@ pub struct ManyBench {
     /// Relative tolerance of the batch.
     #[arg(long, default_value_t = BatchSettings::default().relative)]
     pub relative: f64,
+    /// Stiffness of the empty parts of boundary cells over the tissue's, 0.001 to 1.
+    #[arg(long, default_value_t = FILL)]
+    pub fill: f64,
     /// Worker threads; all by default.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
+    /// Step them on a graphics card too. Needs a build with the feature `gpu`.
+    #[arg(long)]
+    pub gpu: bool,
 }
 
 /// One number of instances of one lattice.
@@ -87,6 +95,36 @@ pub struct InstancesRow {
     pub unconverged: usize,
 }
 
+/// The same instances on a graphics card.
+#[derive(Clone, Debug, Serialize)]
+pub struct CardRow {
+    /// Name of the card.
+    pub card: String,
+    /// Number of instances.
+    pub instances: usize,
+    /// Nodes of the lattice.
+    pub nodes: usize,
+    /// Frames of the whole batch a second, by the median. Paths of the tools go to the card and
+    /// reports come back in each.
+    pub frames_per_s: f64,
+    /// Frames of one organ a second.
+    pub organ_frames_per_s: f64,
+    /// Times the rate of the lanes in the same run.
+    pub over_lanes: f64,
+    /// RMS distance from the converged solution of the same substeps over RMS displacement, the
+    /// worst of the judged instances.
+    pub error: f64,
+    /// Memory on the card (MB).
+    pub memory_mb: f64,
+    /// Rounds of a substep's search.
+    pub rounds: f64,
+    /// Substeps whose search did not end within its tolerance.
+    pub unconverged: usize,
+}
+
+/// World positions of an instance's points in the converged solution, and at rest (m).
+type Truth = [Vec<DVec3>; 2];
+
 /// Figures of the benchmark.
 #[derive(Clone, Debug, Serialize)]
 pub struct ManyResult {
@@ -94,6 +132,9 @@ pub struct ManyResult {
     pub rows: Vec<InstancesRow>,
     /// The ways to step one alone, for each number of nodes.
     pub alone: Vec<Alone>,
+    /// The same on a graphics card, with `--gpu`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub card: Vec<CardRow>,
     /// Worker threads.
     pub threads: usize,
     /// Substeps of a frame.
@@ -113,18 +154,24 @@ impl Study for ManyBench {
         self.check()?;
         job.claim()?;
         let machine = Machine::here();
-        let (mut rows, mut alone) = (Vec::new(), Vec::new());
+        let (mut rows, mut alone, mut card) = (Vec::new(), Vec::new(), Vec::new());
         for nodes in &self.nodes {
-            let scene = Scene::new(*nodes)?;
-            let errors = self.errors(&scene, job.progress)?;
+            let scene = Scene::new(*nodes, self.fill)?;
+            let truths = self.truths(&scene, job.progress)?;
+            let errors = self.errors(&scene, &truths)?;
             let ways = alone::errors(&scene, self.judged_frames, self.substeps, || check_interrupted(job.progress))?;
             for count in &self.instances {
-                rows.push(self.row(&scene, *count, (&errors, &ways), job.progress)?);
+                let row = self.row(&scene, *count, (&errors, &ways), job.progress)?;
+                if self.gpu {
+                    card.push(self.card_row(&scene, &row, &truths, job.progress)?);
+                }
+                rows.push(row);
             }
             alone.extend(ways);
         }
         let threads = if self.threads == 0 { machine.cores } else { self.threads };
-        let result = ManyResult { rows, alone, threads, substeps: self.substeps, isa: Isa::detect().name(), machine };
+        let result =
+            ManyResult { rows, alone, card, threads, substeps: self.substeps, isa: Isa::detect().name(), machine };
         let document = page::document(&result)?;
         Ok((result, document))
     }
@@ -147,7 +194,19 @@ impl ManyBench {
                 self.frames, self.judged, self.judged_frames
             )));
         }
+        if !(1e-3..=1.0).contains(&self.fill) {
+            return Err(Error::Mismatch(format!("--fill {}: must be in [0.001, 1]", self.fill)));
+        }
+        if self.gpu && !cfg!(feature = "gpu") {
+            let reason = "--gpu: this build cannot use a graphics card; build it with `--features gpu`";
+            return Err(Error::Mismatch(reason.to_owned()));
+        }
         Ok(())
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn card_row(&self, _: &Scene, _: &InstancesRow, _: &[Truth], _: &dyn Progress) -> Result<CardRow> {
+        Err(Error::Mismatch("--gpu: this build cannot use a graphics card".to_owned()))
     }
 
     fn settings(&self) -> BatchSettings {
@@ -164,26 +223,29 @@ impl ManyBench {
         Ok(batch)
     }
 
-    /// Errors of the first instances. They do not depend on the number of instances.
-    fn errors(&self, scene: &Scene, progress: &dyn Progress) -> Result<Vec<f64>> {
-        let most = self.instances.iter().copied().max().unwrap_or(1);
-        let judged = self.judged.min(most);
+    /// The converged solution of the first instances.
+    fn truths(&self, scene: &Scene, progress: &dyn Progress) -> Result<Vec<Truth>> {
+        let judged = self.judged.min(self.instances.iter().copied().max().unwrap_or(1));
         progress.begin("converged instances", judged as u64);
-        let mut batch = self.batch(scene, judged)?;
+        let truth = |k: usize| {
+            let stop = || check_interrupted(progress);
+            let truth = scene.converged(k, self.judged_frames, self.substeps, stop)?;
+            progress.advance(1);
+            Ok(truth)
+        };
+        let truths = (0..judged).map(truth).collect::<Result<_>>()?;
+        progress.end();
+        Ok(truths)
+    }
+
+    /// Errors of the first instances. They do not depend on the number of instances.
+    fn errors(&self, scene: &Scene, truths: &[Truth]) -> Result<Vec<f64>> {
+        let mut batch = self.batch(scene, truths.len())?;
         for frame in 0..self.judged_frames {
-            let tools: Vec<ToolMotion> = (0..judged).map(|k| scene.tool(k, frame)).collect();
+            let tools: Vec<ToolMotion> = (0..truths.len()).map(|k| scene.tool(k, frame)).collect();
             batch.step(&tools).map_err(of_tissue)?;
         }
-        let mut errors = Vec::new();
-        for k in 0..judged {
-            let stop = || check_interrupted(progress);
-            let [truth, rest] = scene.converged(k, self.judged_frames, self.substeps, stop)?;
-            let own: Vec<DVec3> = scene.points.iter().map(|point| batch.point(k, point)).collect();
-            errors.push(rms_error(&own, &truth, &rest));
-            progress.advance(1);
-        }
-        progress.end();
-        Ok(errors)
+        Ok(errors_of(&batch, scene, truths))
     }
 
     /// Times a number of instances in turn with those alone.
@@ -248,6 +310,15 @@ impl ManyBench {
             unconverged,
         })
     }
+}
+
+/// Errors of the first instances of a batch.
+fn errors_of(batch: &Batch, scene: &Scene, truths: &[Truth]) -> Vec<f64> {
+    let error = |(k, [truth, rest]): (usize, &Truth)| {
+        let own: Vec<DVec3> = scene.points.iter().map(|point| batch.point(k, point)).collect();
+        rms_error(&own, truth, rest)
+    };
+    truths.iter().enumerate().map(error).collect()
 }
 
 /// An error of the tissue, as one of a study.

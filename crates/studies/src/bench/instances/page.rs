@@ -1,6 +1,6 @@
 //! The page of `bench many`.
 
-use super::{InstancesRow, ManyResult};
+use super::{CardRow, InstancesRow, ManyResult};
 use crate::Result;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::Card;
@@ -44,9 +44,16 @@ pub(super) fn document(result: &ManyResult) -> Result<Document> {
             ("Error", &|r| percent(r.error, 3)),
         ],
     );
-    Ok(Document::new("Many", "Many instances of one lattice in lanes")
-        .with(section)
-        .with(Section::new("Alone", "The same organ and motion, stepped by itself.").table(alone)))
+    let mut document = Document::new("Many", "Many instances of one lattice in lanes").with(section);
+    if let Some(first) = result.card.first() {
+        let lead = format!(
+            "The same instances on a graphics card, {}, beside the lanes of the same run. Paths of the tools go to the \
+             card and reports come back in each frame.",
+            first.card
+        );
+        document = document.with(Section::new("On a graphics card", lead).table(card(&result.card)));
+    }
+    Ok(document.with(Section::new("Alone", "The same organ and motion, stepped by itself.").table(alone)))
 }
 
 fn table(rows: &[InstancesRow]) -> Table {
@@ -62,6 +69,23 @@ fn table(rows: &[InstancesRow]) -> Table {
             ("Over one alone", &|r| format!("{}\u{d7}", fixed(r.over_alone, 1))),
             ("Alone (ms)", &|r| fixed(r.alone_ms, 3)),
             ("Its error", &|r| percent(r.alone_error, 3)),
+            ("Rounds", &|r| fixed(r.rounds, 1)),
+            ("Unconverged", &|r| count(r.unconverged)),
+        ],
+    )
+}
+
+fn card(rows: &[CardRow]) -> Table {
+    Table::of(
+        rows,
+        &[
+            ("Nodes", &|r| count(r.nodes)),
+            ("Instances", &|r| count(r.instances)),
+            ("Frames/s", &|r| fixed(r.frames_per_s, 1)),
+            ("Organ frames/s", &|r| count(r.organ_frames_per_s.round() as usize)),
+            ("Over lanes", &|r| format!("{}\u{d7}", fixed(r.over_lanes, 1))),
+            ("Error", &|r| percent(r.error, 3)),
+            ("Memory (MB)", &|r| fixed(r.memory_mb, 1)),
             ("Rounds", &|r| fixed(r.rounds, 1)),
             ("Unconverged", &|r| count(r.unconverged)),
         ],

@@ -30,8 +30,8 @@ const TILT: f64 = 0.4;
 /// Elements of the mesh that the lattice is cut from.
 const FINE: usize = 15_000;
 
-/// Stiffness of the empty part of boundary cells over the tissue's.
-const FILL: f64 = 1e-3;
+/// Stiffness of the empty part of boundary cells over the tissue's, by default.
+pub(super) const FILL: f64 = 1e-3;
 
 /// Points that a grasp holds, and the stiffness of each one's spring (N/m): that of a contact with
 /// tissue of 12 kPa.
@@ -61,17 +61,17 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    /// With about a number of nodes.
+    /// With about a number of nodes; empty parts of boundary cells are `fill` as stiff as tissue.
     ///
     /// # Errors
     /// An organ that cannot be meshed so coarsely.
-    pub fn new(nodes: usize) -> Result<Self> {
+    pub fn new(nodes: usize, fill: f64) -> Result<Self> {
         let undamped = Material { viscosity: 0.0, ..material(MODULUS, POISSON) };
         let fine = BenchScene::drag(&Organs::analytic_largest(FINE)?, undamped)?;
         let organ = &fine.model.bodies()[0];
         let rest = organ.rest_positions();
         let (mesh, kept) = movable(rest, organ.tets(), organ.pinned());
-        let lattice = lattice_of(&mesh, nodes)?;
+        let lattice = lattice_of(&mesh, nodes, fill)?;
         let cell = lattice.cell();
         let patch: Vec<DVec3> = fine.patches[0].nodes.iter().map(|i| rest[*i as usize]).collect();
         let held = spread(&patch);
@@ -213,10 +213,9 @@ fn spread(points: &[DVec3]) -> Vec<DVec3> {
 }
 
 /// The lattice with the number of nodes nearest to `nodes`, by halving the interval of its cell.
-fn lattice_of(mesh: &TetMesh, nodes: usize) -> Result<Lattice> {
-    let cut = |cell: f64| {
-        Lattice::of_mesh(mesh, &LatticeOptions { fill: FILL, ..LatticeOptions::new(cell) }).map_err(of_lattice)
-    };
+fn lattice_of(mesh: &TetMesh, nodes: usize, fill: f64) -> Result<Lattice> {
+    let cut =
+        |cell: f64| Lattice::of_mesh(mesh, &LatticeOptions { fill, ..LatticeOptions::new(cell) }).map_err(of_lattice);
     let size = (mesh.volume() / nodes.max(1) as f64).cbrt();
     let (mut small, mut large) = (0.8 * size, 4.0 * size);
     let mut best = cut(large)?;

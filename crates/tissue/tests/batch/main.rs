@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
+#[cfg(feature = "gpu")]
+mod gpu;
+
 use glam::{DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_lattice::{
