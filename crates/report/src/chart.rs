@@ -116,6 +116,6 @@ mod tests {
         assert!(bright > 240 && (70..140).contains(&faint), "{bright} where it is known, {faint} where not");
         let middle = 0.5 * (ABOVE + bottom);
         assert!(at(along(2.0), middle)[2] > 240 && at(along(8.0), middle)[2] > 240);
-        assert_eq!(at(along(9.5), middle)[2], 0);
+        assert!(at(along(9.5), middle)[2] < 60, "only the grid is there");
     }
 }

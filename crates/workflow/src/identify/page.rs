@@ -66,8 +66,8 @@ fn filmed(number: usize, film: &LiftFilm) -> Section {
     let said = "At the left the recording with what is measured in it, at the right the organ with the best values \
                 through the same camera. Below: the lift along the organ, with the half-drop distance d50 marked.";
     let caption = format!(
-        "<b>Lift {number}</b>, that with the longest way. The simulated tissue is shown where it has gone the same \
-         share of its way."
+        "<b>Lift {number}</b>, that with the longest way. At each moment the simulated tissue has gone the same share of \
+         its way as the filmed one."
     );
     let figure = film.figure("a filmed lift, and at its right the same lift simulated", &caption);
     Section::new("A lift, filmed and simulated", said).html(figure)

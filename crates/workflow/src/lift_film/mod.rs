@@ -21,7 +21,7 @@ use std::time::Instant;
 use trocar_camera::ColorImage;
 use trocar_core::Progress;
 use trocar_measure::{Film, MeasuredLift};
-use trocar_report::{figures, page};
+use trocar_report::{colors, figures, page};
 
 /// Maximum number of frames; a longer lift leaves some out.
 const MAX_FRAMES: usize = 48;
@@ -33,9 +33,9 @@ const USUAL_HZ: f64 = 30.0;
 const LAST_MS: i32 = 1500;
 
 /// Colours of what is filmed and of what is simulated.
-pub const FILMED: [u8; 3] = [70, 165, 225];
+pub const FILMED: [u8; 3] = colors::organ(1);
 /// See [`FILMED`].
-pub const SIMULATED: [u8; 3] = [230, 150, 20];
+pub const SIMULATED: [u8; 3] = colors::organ(0);
 
 /// A film of a lift.
 #[derive(Clone, Debug)]

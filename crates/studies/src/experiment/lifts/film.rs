@@ -51,8 +51,8 @@ impl HeldOutFilm {
     pub fn figure(&self) -> String {
         let caption = format!(
             "<b>Lift {}.</b> Support and tissue of the simulated appendix are identified from the other half of the \
-             lifts. Of all lifts that were not fitted, this one has the middle landmark error: {} mm at the peak. The \
-             simulated tissue is shown where it has gone the same share of its way.",
+             lifts. Of all lifts that were not fitted, this one has the middle landmark error: {} mm at the peak. At \
+             each moment the simulated tissue has gone the same share of its way as the filmed one.",
             self.judged.lift,
             or_dash(self.judged.landmark_rmse_mm, 2)
         );
