@@ -106,14 +106,18 @@ fn landmarks_lie_on_the_tissue_of_both_panels() {
     // The colours are at the places of the landmarks.
     let frame = RecordingFilm::new(&recording).frame(lift.info.rest).unwrap();
     let shown = panel.filmed(Seen { color: &frame.color, depth: &frame.depth }, &moments[0]).unwrap();
-    let right = view.panel(&panel, 1, &moments[1]).unwrap();
+    // Without the circles of the filmed landmarks, which may lie over the simulated ones.
+    let bare = Moment { landmarks: Vec::new(), ..moments[1].clone() };
+    let right = view.panel(&panel, 1, &bare).unwrap();
     let drawn = |picture: &ColorImage, moment: &Moment, color: [u8; 3]| {
         let held = moment.grasp.and_then(|[_, now]| panel.place(now)).unwrap();
-        let free =
-            moment.landmarks.iter().flatten().filter_map(|p| panel.place(*p)).filter(|p| p.distance(held) > 20.0);
-        free.filter(|p| picture.pixels[p.y as usize * picture.width + p.x as usize] == color).count()
+        let places = moment.landmarks.iter().flatten().filter_map(|p| panel.place(*p));
+        let free: Vec<_> = places.filter(|p| p.distance(held) > 20.0).collect();
+        let colored = |p: &&glam::DVec2| picture.pixels[p.y as usize * picture.width + p.x as usize] == color;
+        assert_eq!((free.iter().filter(colored).count(), free.len() > 6), (free.len(), true));
     };
-    assert!(drawn(&shown, &moments[0], FILMED) > 10 && drawn(&right, &simulated[1], SIMULATED) > 8);
+    drawn(&shown, &moments[0], FILMED);
+    drawn(&right, &simulated[1], SIMULATED);
 
     // A film of the first frames, and the same bytes again.
     let mut lift = lift;
