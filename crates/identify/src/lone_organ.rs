@@ -8,7 +8,7 @@ use trocar_core::{Pose, Progress};
 use trocar_geometry::{LatticeMesher, MeshDistance, OrganAxis, Skin, TetQuality, TriMesh};
 use trocar_measure::{LiftProfile, SPACING};
 use trocar_specimen::{Organ, Specimen};
-use trocar_tissue::{Grasp, SolverSettings, ToolMotion};
+use trocar_tissue::{Grasp, SolverSettings, State, ToolMotion};
 
 /// Nodes nearer to the grasp along the organ than this are held (m).
 const HELD: f64 = 3.5e-3;
@@ -39,6 +39,11 @@ impl Pace {
     pub const SLOW: Self = Self { settle: 60, rise: 100, hold: 60 };
     /// That of many lifts.
     pub const QUICK: Self = Self { settle: 40, rise: 40, hold: 25 };
+
+    /// Share of the way that is gone in a frame of the rise.
+    fn share(self, frame: usize) -> f64 {
+        smoothstep((frame as f64 / self.rise as f64).min(1.0))
+    }
 }
 
 /// Which nodes a grasp holds.
@@ -68,6 +73,21 @@ pub struct Lifted {
     top: Vec<DVec3>,
     /// Force of the instrument on the tissue at the top (N).
     pub force: DVec3,
+}
+
+/// An organ at rest on its bed.
+struct Settled {
+    world: World,
+    state: State,
+    rest: Vec<DVec3>,
+}
+
+impl Lifted {
+    /// Where the organ is now, and the force on it.
+    fn of(rest: &[DVec3], now: &World) -> Self {
+        let force = now.forces().first().map_or(DVec3::ZERO, |f| -f.constraint.force);
+        Self { rest: rest.to_vec(), top: now.state.positions(&now.model, 0), force }
+    }
 }
 
 impl LoneOrgan {
@@ -155,43 +175,78 @@ impl LoneOrgan {
     /// # Errors
     /// An organ that cannot be simulated or has no free part; an interruption.
     pub fn lift(&self, pulls: &[Pull], pace: Pace, progress: &dyn Progress) -> Result<Vec<Option<Lifted>>> {
+        let Some(mut course) = self.settled(pace)? else { return Ok(pulls.iter().map(|_| None).collect()) };
+        pulls.iter().map(|pull| self.pulled(&mut course, pull, pace, &mut |_, _| {}, progress)).collect()
+    }
+
+    /// Lifts the organ from rest, and returns it at `shares` of the way, which rise from 0. At 1 it
+    /// is where [`lift`](Self::lift) leaves it. `None` if the simulation diverges.
+    ///
+    /// # Errors
+    /// As [`lift`](Self::lift).
+    pub fn lift_at(
+        &self,
+        pull: &Pull,
+        pace: Pace,
+        shares: &[f64],
+        progress: &dyn Progress,
+    ) -> Result<Option<Vec<Lifted>>> {
+        let Some(mut course) = self.settled(pace)? else { return Ok(None) };
+        let frame = |share: &f64| match *share {
+            all if all >= 1.0 => pace.rise + pace.hold,
+            share => (0..pace.rise).find(|f| pace.share(*f) >= share).unwrap_or(pace.rise),
+        };
+        let frames: Vec<usize> = shares.iter().map(frame).collect();
+        let mut shown: Vec<Option<Lifted>> = vec![None; shares.len()];
+        let rest = course.rest.clone();
+        let mut show = |frame: usize, now: &World| {
+            for (_, lifted) in frames.iter().zip(&mut shown).filter(|(wanted, _)| **wanted == frame) {
+                *lifted = Some(Lifted::of(&rest, now));
+            }
+        };
+        let last = self.pulled(&mut course, pull, pace, &mut show, progress)?;
+        Ok(last.and_then(|_| shown.into_iter().collect()))
+    }
+
+    /// The organ at rest on its bed; `None` if the simulation diverges.
+    fn settled(&self, pace: Pace) -> Result<Option<Settled>> {
         let surroundings = Surroundings { body_contact: None, ..Surroundings::default() };
         let mut world = World::surrounded(&self.specimen, &surroundings, Vec::new(), SolverSettings::FAST, 1)?;
         for _ in 0..pace.settle {
             world.step(&[]);
         }
-        let settled = world.state.clone();
-        let rest = settled.positions(&world.model, 0);
-        if !rest.iter().all(|p| p.is_finite()) {
-            return Ok(pulls.iter().map(|_| None).collect());
-        }
-        let mut lifted = Vec::with_capacity(pulls.len());
-        for pull in pulls {
-            world.state = settled.clone();
-            let held = self.held(&world, pull)?;
-            let grasp = Grasp::capture(&world.model, &world.state, 0, &held, 0, &Pose::IDENTITY);
-            world.state.grasps.push(grasp);
-            let at = |frame: usize| {
-                let share = smoothstep((frame as f64 / pace.rise as f64).min(1.0));
-                Pose { translation: share * pull.displacement, ..Pose::IDENTITY }
-            };
-            let mut diverged = false;
-            for frame in 0..pace.rise + pace.hold {
-                if progress.interrupted() {
-                    return Err(Error::Interrupted);
-                }
-                let report = world.step(&[ToolMotion { from: at(frame), to: at(frame + 1) }]);
-                diverged |= report.divergence.is_some();
-                if diverged {
-                    break;
-                }
+        let rest = world.state.positions(&world.model, 0);
+        let finite = rest.iter().all(|p| p.is_finite());
+        Ok(finite.then(|| Settled { state: world.state.clone(), world, rest }))
+    }
+
+    /// One lift from rest; `show` sees frame 0, in which the organ is at rest, and all others.
+    fn pulled(
+        &self,
+        Settled { world, state, rest }: &mut Settled,
+        pull: &Pull,
+        pace: Pace,
+        show: &mut dyn FnMut(usize, &World),
+        progress: &dyn Progress,
+    ) -> Result<Option<Lifted>> {
+        world.state = state.clone();
+        let held = self.held(world, pull)?;
+        let grasp = Grasp::capture(&world.model, &world.state, 0, &held, 0, &Pose::IDENTITY);
+        world.state.grasps.push(grasp);
+        show(0, world);
+        let at = |frame: usize| Pose { translation: pace.share(frame) * pull.displacement, ..Pose::IDENTITY };
+        for frame in 0..pace.rise + pace.hold {
+            if progress.interrupted() {
+                return Err(Error::Interrupted);
             }
-            let top = world.state.positions(&world.model, 0);
-            let force = world.forces().first().map_or(DVec3::ZERO, |f| -f.constraint.force);
-            let finite = !diverged && top.iter().all(|p| p.is_finite());
-            lifted.push(finite.then(|| Lifted { rest: rest.clone(), top, force }));
+            let report = world.step(&[ToolMotion { from: at(frame), to: at(frame + 1) }]);
+            if report.divergence.is_some() {
+                return Ok(None);
+            }
+            show(frame + 1, world);
         }
-        Ok(lifted)
+        let lifted = Lifted::of(rest, world);
+        Ok(lifted.top.iter().all(|p| p.is_finite()).then_some(lifted))
     }
 
     /// The nodes that a grasp holds.
@@ -233,6 +288,13 @@ impl LoneOrgan {
         skin.deform(&self.organ().body, &lifted.rest, &mut rest);
         skin.deform(&self.organ().body, &lifted.top, &mut top);
         top.iter().zip(&rest).map(|(top, rest)| *top - *rest).collect()
+    }
+
+    /// Where bound points are at the top (m).
+    pub fn places_of(&self, lifted: &Lifted, skin: &Skin) -> Vec<DVec3> {
+        let mut top = vec![DVec3::ZERO; skin.bindings.len()];
+        skin.deform(&self.organ().body, &lifted.top, &mut top);
+        top
     }
 
     /// Motions of points of the recorded pose from rest to the top (m).

@@ -1,7 +1,7 @@
 //! A measured lift in the frame of the specimen.
 
 use crate::alignment::Alignment;
-use crate::lone_organ::{Grip, LoneOrgan, Pull};
+use crate::lone_organ::{Grip, Lifted, LoneOrgan, Pull};
 use crate::observation::{Landmark, Observation};
 use glam::{DMat3, DVec3};
 use trocar_measure::{MeasuredLift, SPACING, chamfer};
@@ -67,15 +67,19 @@ impl SeenLift {
         Pull { s: self.grasp_s, displacement: self.displacement, grip }
     }
 
+    /// Motions of points of the specimen in a simulated lift, in the frame of the recording (m).
+    pub fn motions(&self, organ: &LoneOrgan, lifted: &Lifted, points: &[DVec3]) -> Vec<DVec3> {
+        organ.motions(lifted, points.to_vec()).into_iter().map(|d| self.back * d).collect()
+    }
+
     /// Landmark error and local Chamfer distance of a simulated lift (m).
-    pub fn compared(&self, organ: &LoneOrgan, lifted: &crate::Lifted) -> [Option<f64>; 2] {
-        let moved = |points: &[DVec3]| -> Vec<DVec3> {
-            organ.motions(lifted, points.to_vec()).into_iter().map(|d| self.back * d).collect()
-        };
-        let landmarks: Vec<Option<DVec3>> = moved(&self.landmarks).into_iter().map(Some).collect();
+    pub fn compared(&self, organ: &LoneOrgan, lifted: &Lifted) -> [Option<f64>; 2] {
+        let landmarks: Vec<Option<DVec3>> =
+            self.motions(organ, lifted, &self.landmarks).into_iter().map(Some).collect();
         let surface = self.lift.surface(self.lift.peak);
         let (rest, now): (Vec<DVec3>, Vec<DVec3>) = surface.into_iter().unzip();
-        let predicted: Vec<DVec3> = rest.iter().zip(moved(&self.points)).map(|(p, d)| *p + d).collect();
+        let predicted: Vec<DVec3> =
+            rest.iter().zip(self.motions(organ, lifted, &self.points)).map(|(p, d)| *p + d).collect();
         [self.lift.landmark_rmse(&landmarks), chamfer(&predicted, &now)]
     }
 }

@@ -32,21 +32,33 @@ pub struct Landmark {
 impl Landmark {
     /// The landmarks of a lift.
     pub(crate) fn all(lift: &MeasuredLift) -> Vec<Self> {
-        let [peak, beside] = [lift.peak, lift.beside].map(|frame| lift.motion(frame));
-        let middle = |motion: &[Option<DVec3>], station: usize| {
-            let near = lift.points.iter().zip(motion);
+        let [peak, beside] = [lift.peak, lift.beside].map(|frame| Self::motions(lift, frame));
+        let landmark = |(station, (moved, beside)): (usize, (Option<DVec3>, Option<DVec3>))| Self {
+            along: station as f64 * SPACING,
+            rest: lift.centreline.stations[station].point,
+            moved,
+            beside,
+        };
+        Self::stations(lift).zip(peak.into_iter().zip(beside)).map(landmark).collect()
+    }
+
+    /// The motions of the landmarks from the frame at rest to another one (m); `None` where one is
+    /// hidden.
+    pub(crate) fn motions(lift: &MeasuredLift, frame: usize) -> Vec<Option<DVec3>> {
+        let motion = lift.motion(frame);
+        let middle = |station: usize| {
+            let near = lift.points.iter().zip(&motion);
             let near = near.filter(|(p, _)| p.station.abs_diff(station) <= AROUND && p.across.abs() <= ACROSS);
             let moved: Vec<DVec3> = near.filter_map(|(_, d)| *d).collect();
             let along = |axis: usize| median(moved.iter().map(|d| d[axis]).collect::<Vec<_>>());
             (moved.len() >= LEAST).then(|| Some(DVec3::new(along(0)?, along(1)?, along(2)?)))?
         };
-        let landmark = |station: usize| Self {
-            along: station as f64 * SPACING,
-            rest: lift.centreline.stations[station].point,
-            moved: middle(&peak, station),
-            beside: middle(&beside, station),
-        };
-        (0..lift.centreline.stations.len()).step_by(EVERY).map(landmark).collect()
+        Self::stations(lift).map(middle).collect()
+    }
+
+    /// The places of the landmarks.
+    fn stations(lift: &MeasuredLift) -> impl Iterator<Item = usize> {
+        (0..lift.centreline.stations.len()).step_by(EVERY)
     }
 }
 

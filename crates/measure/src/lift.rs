@@ -113,9 +113,9 @@ impl MeasuredLift {
             landmarks: Vec::new(),
         };
         measured.find_peak();
-        let lifts = measured.lifts_in(measured.peak);
-        measured.profile = LiftProfile::of(&lifts, SPACING);
-        measured.apex = measured.profile.as_ref().and_then(|profile| measured.motion_at(profile.apex_at));
+        measured.profile = measured.profile_in(measured.peak);
+        measured.apex =
+            measured.profile.as_ref().and_then(|profile| measured.motion_at(profile.apex_at, measured.peak));
         measured.landmarks = Landmark::all(&measured);
         Ok(measured)
     }
@@ -133,6 +133,17 @@ impl MeasuredLift {
     pub fn lifts_in(&self, frame: usize) -> Vec<Option<f64>> {
         let rise: Vec<Option<f64>> = self.motion(frame).iter().map(|d| d.map(|d| d.dot(self.plane.normal))).collect();
         self.per_station(&rise)
+    }
+
+    /// The lift along the organ in a frame; `None` if too little is seen or nothing rises.
+    pub fn profile_in(&self, frame: usize) -> Option<LiftProfile> {
+        LiftProfile::of(&self.lifts_in(frame), SPACING)
+    }
+
+    /// How far each landmark has moved from the frame at rest to another one (m); `None` where it
+    /// is hidden.
+    pub fn landmarks_in(&self, frame: usize) -> Vec<Option<DVec3>> {
+        Landmark::motions(self, frame)
     }
 
     /// The medians of the values of the points at each place.
@@ -163,10 +174,10 @@ impl MeasuredLift {
         self.beside = after.or(before).unwrap_or(self.peak);
     }
 
-    /// Position at rest and motion at the peak of the place `along` the organ (m), bridged where it
-    /// is hidden.
-    pub fn motion_at(&self, along: f64) -> Option<ApexMotion> {
-        let motion = self.motion(self.peak);
+    /// Position at rest of the place `along` the organ, and its motion from there to a frame (m),
+    /// bridged where it is hidden.
+    pub fn motion_at(&self, along: f64, frame: usize) -> Option<ApexMotion> {
+        let motion = self.motion(frame);
         let mut displacement = DVec3::ZERO;
         for axis in 0..3 {
             let values: Vec<Option<f64>> = motion.iter().map(|d| d.map(|d| d[axis])).collect();

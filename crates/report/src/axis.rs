@@ -79,7 +79,7 @@ pub fn decimal(value: f64, span: f64) -> String {
 /// Tick positions of an axis from `low` to `high`, about `max`. A logarithmic axis, whose ends are
 /// exponents of ten, has ticks at powers of ten, or at every nth power; a short one at 1, 2 and 5
 /// times powers of ten, or at all whole multiples if fewer than three would be left.
-fn ticks(log: bool, low: f64, high: f64, max: usize) -> Vec<f64> {
+pub fn ticks(log: bool, low: f64, high: f64, max: usize) -> Vec<f64> {
     if !log {
         let axis: RangedCoordf64 = (low..high).into();
         return axis.key_points(max);

@@ -8,7 +8,7 @@ pub const INSTRUMENT: [u8; 3] = [0, 229, 255];
 
 /// Colour of organ `index`, distinguishable with most kinds of colour vision (after M. Okabe and K.
 /// Ito).
-pub fn organ(index: usize) -> [u8; 3] {
+pub const fn organ(index: usize) -> [u8; 3] {
     const HUES: [[u8; 3]; 8] = [
         [230, 150, 20],
         [70, 165, 225],

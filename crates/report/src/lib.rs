@@ -2,6 +2,8 @@
 //! The crate knows no study and no simulator. Pages have no scripts and load nothing.
 
 mod axis;
+pub mod canvas;
+pub mod chart;
 pub mod colors;
 pub mod document;
 mod error;

@@ -9,6 +9,7 @@ mod gltf;
 pub mod identify;
 mod inspect;
 mod lift;
+pub mod lift_film;
 mod lift_result;
 pub mod measure;
 pub mod pages;

@@ -73,15 +73,7 @@ impl VideoWriter {
     /// Writes the file `output`.
     pub fn finish(mut self, output: &Path) -> Result<()> {
         match &mut self {
-            Self::Webp(frames) => {
-                let part = partial_path(output);
-                let written = std::fs::write(&part, webp(frames)?).and_then(|()| std::fs::rename(&part, output));
-                written.map_err(|source| {
-                    // A partial file must not stay.
-                    let _ = std::fs::remove_file(&part);
-                    Error::Io { path: output.to_owned(), source }
-                })
-            }
+            Self::Webp(frames) => write_whole(output, &webp(frames)?),
             Self::Mp4 { part, encoder } => {
                 let status = encoder.take().map(|mut child| {
                     drop(child.stdin.take());
@@ -94,6 +86,16 @@ impl VideoWriter {
             }
         }
     }
+}
+
+/// Writes a file whole or not at all.
+pub(crate) fn write_whole(output: &Path, bytes: &[u8]) -> Result<()> {
+    let part = partial_path(output);
+    std::fs::write(&part, bytes).and_then(|()| std::fs::rename(&part, output)).map_err(|source| {
+        // A partial file must not stay.
+        let _ = std::fs::remove_file(&part);
+        Error::Io { path: output.to_owned(), source }
+    })
 }
 
 fn partial_path(output: &Path) -> PathBuf {

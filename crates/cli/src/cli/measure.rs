@@ -22,6 +22,12 @@ pub struct Measure {
     /// Pixel on the organ in an episode's frame --rest; by default in the organ's middle.
     #[arg(long, value_name = "U,V", value_delimiter = ',', num_args = 2)]
     pub click: Option<Vec<f64>>,
+    /// Film of a lift to write (.webp), with landmarks, plane, grasp and lift profile drawn in.
+    #[arg(long, value_name = "FILE")]
+    pub film: Option<PathBuf>,
+    /// Number of the lift that --film shows, from 0.
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, requires = "film")]
+    pub lift: usize,
     /// Specimen folder of an episode, if it was moved from its place in the scene.
     #[arg(long, value_name = "FOLDER")]
     pub specimen: Option<PathBuf>,

@@ -4,7 +4,7 @@ use crate::cli::Measure;
 use crate::output;
 use trocar_core::Progress;
 use trocar_measure::{LiftFigures, PAPER};
-use trocar_workflow::measure::{LiftRow, Measured, Measuring};
+use trocar_workflow::measure::{FilmFile, LiftRow, Measured, Measuring};
 use trocar_workflow::{Result, counted};
 
 pub fn run(arguments: &Measure, json: bool, progress: &dyn Progress) -> Result<()> {
@@ -15,9 +15,13 @@ pub fn run(arguments: &Measure, json: bool, progress: &dyn Progress) -> Result<(
         click: arguments.click.as_ref().and_then(|c| c.as_slice().try_into().ok()),
         specimen: arguments.specimen.clone(),
         phantoms: arguments.phantoms.clone(),
+        film: arguments.film.clone().map(|path| FilmFile { path, lift: arguments.lift }),
     };
     let measured = measuring.run(progress)?;
-    output::print(json, &measured, text);
+    output::print(json, &measured, |m| {
+        let film = arguments.film.as_ref().map(|path| format!("\nfilm {}", path.display()));
+        text(m) + &film.unwrap_or_default()
+    });
     Ok(())
 }
 

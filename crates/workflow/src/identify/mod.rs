@@ -2,6 +2,7 @@
 
 mod page;
 
+use crate::lift_film::{LiftFilm, ShownLift, Simulated};
 use crate::measure::measure_recording;
 use crate::reconstruct::{REPORT, refuse_overlap};
 use crate::{Error, Result, check_interrupted};
@@ -10,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use trocar_core::Progress;
 use trocar_identify::{Grip, Identification, Identified, LoneOrgan, Pace, SeenLift, default_priors};
+use trocar_measure::RecordingFilm;
 use trocar_recording::Recording;
 use trocar_specimen::{Organ, Parameter, Posterior, Specimen};
 
@@ -144,6 +146,13 @@ impl Identifying {
         let landmark_rmse_mm = rmse(&|organ| Posterior::apply(&found.best, organ))?;
         progress.advance(1);
         progress.end();
+        let film = match Simulated::not_shown(&specimen, &recording.camera()) {
+            None => film(&recording, &specimen, &organ, &found, &seen, progress)?,
+            Some(why) => {
+                notes.push(format!("there is no film of a lift: {why}"));
+                None
+            }
+        };
         notes.extend(said(&found, identification.lifts.iter().any(|l| l.force.is_some())));
         if let Some(organ) = specimen.organs.iter_mut().find(|o| o.name == name) {
             Posterior::apply(&found.best, organ);
@@ -166,7 +175,7 @@ impl Identifying {
             seconds: clock.elapsed().as_secs_f64(),
             report: output.join(REPORT).display().to_string(),
         };
-        let page = page::document(&result, &found)?.page();
+        let page = page::document(&result, &found, film.as_ref())?.page();
         check_interrupted(progress)?;
         specimen.write_into(staged.path())?;
         let path = staged.path().join(REPORT);
@@ -190,6 +199,26 @@ impl Identifying {
             (None, None) => Err(Error::Mismatch("the recording has no lifts".to_owned())),
         }
     }
+}
+
+/// The film of the lift with the longest way and its number, beside the same lift with the best
+/// values.
+fn film(
+    recording: &Recording,
+    specimen: &Specimen,
+    organ: &LoneOrgan,
+    found: &Identified,
+    seen: &[(usize, SeenLift)],
+    progress: &dyn Progress,
+) -> Result<Option<(usize, LiftFilm)>> {
+    let way = |lift: &SeenLift| lift.displacement.length();
+    let Some((number, seen)) = seen.iter().max_by(|a, b| way(&a.1).total_cmp(&way(&b.1)).then(b.0.cmp(&a.0))) else {
+        return Ok(None);
+    };
+    let organ = organ.with(|organ| Posterior::apply(&found.best, organ));
+    let made = Simulated { specimen, organ: &organ, seen, grip: Grip::Place };
+    let lift = ShownLift { number: *number, rate_hz: recording.info.rate_hz, lift: &seen.lift };
+    Ok(Some((*number, lift.film(&mut RecordingFilm::new(recording), Some(&made), progress)?)))
 }
 
 /// Root mean square landmark error of an organ over lifts (mm); `None` if one diverges.

@@ -2,6 +2,7 @@
 
 use super::{IdentifyResult, ParameterFigures};
 use crate::Result;
+use crate::lift_film::LiftFilm;
 use trocar_identify::Identified;
 use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
@@ -18,7 +19,7 @@ const BEST: [u8; 3] = [214, 84, 40];
 const DRAWN: f64 = 3.0;
 const POINTS: usize = 240;
 
-pub(super) fn document(r: &IdentifyResult, found: &Identified) -> Result<Document> {
+pub(super) fn document(r: &IdentifyResult, found: &Identified, film: Option<&(usize, LiftFilm)>) -> Result<Document> {
     let lead = format!(
         "What holds the {} and how stiff it is, from {} lifts of {}. The organ is lifted alone in a simulation, with many \
          values of each parameter. The posterior is written into the specimen; the organ has the values that explain the \
@@ -51,9 +52,25 @@ pub(super) fn document(r: &IdentifyResult, found: &Identified) -> Result<Documen
     let plots = found.posterior.parameters.iter().enumerate().map(|(k, prior)| plot(found, k, prior));
     let plots = plots.collect::<Result<Vec<_>>>()?;
     let said = "Probability density over each parameter, over its largest value: before the lifts, and after them.";
-    Ok(Document::new(format!("Identified: {}", r.organ), "What lifts tell of support and tissue")
-        .with(section)
-        .with(Section::new("Posterior", said).figures(plots)))
+    let document =
+        Document::new(format!("Identified: {}", r.organ), "What lifts tell of support and tissue").with(section);
+    let document = match film {
+        Some((number, film)) => document.with(filmed(*number, film)),
+        None => document,
+    };
+    Ok(document.with(Section::new("Posterior", said).figures(plots)))
+}
+
+/// The film of a fitted lift.
+fn filmed(number: usize, film: &LiftFilm) -> Section {
+    let said = "At the left the recording with what is measured in it, at the right the organ with the best values \
+                through the same camera. Below: the lift along the organ, with the half-drop distance d50 marked.";
+    let caption = format!(
+        "<b>Lift {number}</b>, that with the longest way. At each moment the simulated tissue has gone the same share of \
+         its way as the filmed one."
+    );
+    let figure = film.figure("a filmed lift, and at its right the same lift simulated", &caption);
+    Section::new("A lift, filmed and simulated", said).html(figure)
 }
 
 impl IdentifyResult {

@@ -25,6 +25,8 @@ pub(crate) struct EpisodeFilm {
     pose: Pose,
     /// Number of frames.
     pub frames: usize,
+    /// Frames in a second.
+    pub rate_hz: f64,
     /// The organ of the episode's task.
     pub organ: String,
 }
@@ -35,6 +37,7 @@ impl EpisodeFilm {
         let mut episode = RecordedEpisode::open(folder, specimen, phantoms, &Silent)?;
         let organ = episode.scene().task.organ.clone();
         let frames = episode.file.steps.len() + 1;
+        let rate_hz = 1.0 / episode.header().period_s;
         let rig = episode.rig()?;
         let first = rig.cameras().first().map(|name| (*name).to_owned());
         let camera = camera.map(str::to_owned).or(first).ok_or_else(|| {
@@ -51,6 +54,7 @@ impl EpisodeFilm {
             model,
             pose,
             frames,
+            rate_hz,
             organ,
         })
     }

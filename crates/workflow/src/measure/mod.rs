@@ -1,6 +1,7 @@
 //! `trocar measure`: grasp-lifts of a recording or of a simulated episode.
 
 mod episode_film;
+mod film_file;
 mod truth;
 
 pub use truth::{LiftTruthFigures, against_truth};
@@ -8,6 +9,7 @@ pub use truth::{LiftTruthFigures, against_truth};
 use crate::truth::quantile;
 use crate::{Error, Result};
 use episode_film::EpisodeFilm;
+pub use film_file::FilmFile;
 use glam::DVec2;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -33,6 +35,8 @@ pub struct Measuring {
     pub specimen: Option<PathBuf>,
     /// Folder of made phantoms, for episodes.
     pub phantoms: PathBuf,
+    /// Film of a lift to write.
+    pub film: Option<FilmFile>,
 }
 
 /// One lift with its figures, or why it has none.
@@ -105,10 +109,22 @@ impl Measuring {
             return Err(Error::Mismatch(format!("{}: {reason}", self.source.display())));
         }
         let recording = Recording::open(&self.source)?;
-        Measured::summary(&recording, &measure_recording(&recording, progress)?)
+        self.check_film(recording.info.lifts.len())?;
+        let measured = measure_recording(&recording, progress)?;
+        if let Some(film) = &self.film {
+            let rate_hz = recording.info.rate_hz;
+            film.write(&mut RecordingFilm::new(&recording), rate_hz, &measured.lifts[film.lift], progress)?;
+        }
+        Measured::summary(&recording, &measured)
+    }
+
+    /// Refuses a film that cannot be written, before anything is measured.
+    fn check_film(&self, lifts: usize) -> Result<()> {
+        self.film.as_ref().map_or(Ok(()), |film| film.check(lifts))
     }
 
     fn episode(&self, progress: &dyn Progress) -> Result<Measured> {
+        self.check_film(1)?;
         let film = EpisodeFilm::open(&self.source, self.specimen.as_deref(), &self.phantoms, self.camera.as_deref());
         let mut film = film?;
         let [rest, first, last] = self.frames;
@@ -132,12 +148,18 @@ impl Measuring {
         progress.begin("lift", (last - rest + 1) as u64);
         let measured = MeasuredLift::of(&mut film, &info, &mask, None, progress);
         progress.end();
+        let measured = match measured {
+            Ok(lift) => Ok(lift),
+            Err(error @ trocar_measure::Error::Organ { .. }) => Err(error.to_string()),
+            Err(error) => return Err(error.into()),
+        };
+        if let Some(file) = &self.film {
+            let rate_hz = Some(film.rate_hz);
+            file.write(&mut film, rate_hz, &measured, progress)?;
+        }
         let row = match measured {
             Ok(lift) => LiftRow { lift: 0, figures: Some(LiftFigures::of(&lift)), failure: None, truth: None },
-            Err(error @ trocar_measure::Error::Organ { .. }) => {
-                LiftRow { lift: 0, figures: None, failure: Some(error.to_string()), truth: None }
-            }
-            Err(error) => return Err(error.into()),
+            Err(reason) => LiftRow { lift: 0, figures: None, failure: Some(reason), truth: None },
         };
         Ok(Measured::of(&self.source, vec![row], &[]))
     }

@@ -2,6 +2,7 @@
 //! lifts of a phantom whose tissue is another than the simulated one are measured, reproduced and
 //! compared.
 
+mod film;
 mod identified;
 mod page;
 mod result;
@@ -112,6 +113,7 @@ impl Study for LiftsExperiment {
             self.threads,
             |fold, progress| identified(*fold, &appendix, &reproduced, progress),
         )?;
+        let film = film::held_out(&recording, &specimen, &appendix, &reproduced, &folds.rows, job.progress)?;
         let identified = IdentifiedSummary::of(folds.rows);
         let (trend, errors) = (trend(&rows), errors(&rows));
         let chosen = errors.iter().find(|e| e.support == Support::Specimen.name() && e.modulus_kpa == 1e-3 * own);
@@ -138,7 +140,7 @@ impl Study for LiftsExperiment {
             true_support: truth.map(|t| t.support.name().to_owned()).unwrap_or_default(),
             resumed,
         };
-        let document = page::document(&result)?;
+        let document = page::document(&result, film.as_ref())?;
         Ok((result, document))
     }
 }

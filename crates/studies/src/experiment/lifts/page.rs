@@ -1,5 +1,6 @@
 //! The page of the study.
 
+use super::film::HeldOutFilm;
 use super::result::{BAR_MM, ErrorRow, LiftsResult, TrendRow};
 use super::support::Support;
 use crate::Result;
@@ -18,10 +19,14 @@ const RECORDED: [u8; 3] = [214, 84, 40];
 /// The paper's simulated points: lift and d50 (mm).
 const PAPER_SIMULATED: [(f64, f64); 2] = [(15.7, 11.4), (31.5, 19.7)];
 
+/// What the film shows.
+const SAID: &str = "At the left the recording with what is measured in it, at the right the simulated tissue through \
+                    the same camera. Below: the lift along the appendix, with the half-drop distance d50 marked.";
+
 /// Heights between which the paper's line is drawn (mm).
 const DRAWN: [f64; 2] = [5.0, 50.0];
 
-pub(super) fn document(r: &LiftsResult) -> Result<Document> {
+pub(super) fn document(r: &LiftsResult, film: Option<&HeldOutFilm>) -> Result<Document> {
     let lead = format!(
         "Lifts of a phantom's appendix are filmed, measured and reproduced. The filmed tissue has {} kPa, corotated \
          elasticity, a mesh of half the edge length and the hidden support '{}'; the simulated one has {} kPa, stable \
@@ -52,8 +57,12 @@ pub(super) fn document(r: &LiftsResult) -> Result<Document> {
          and the other way round.",
     )
     .table(identified(r));
-    let document = Document::new("Grasp-lifts", "Recorded lifts beside simulated ones");
-    Ok(document.with(section).with(trend).with(errors).with(identified))
+    let document = Document::new("Grasp-lifts", "Recorded lifts beside simulated ones").with(section);
+    let document = match film {
+        Some(film) => document.with(Section::new("A lift, filmed and simulated", SAID).html(film.figure())),
+        None => document,
+    };
+    Ok(document.with(trend).with(errors).with(identified))
 }
 
 fn cards(r: &LiftsResult) -> Vec<Card> {
@@ -275,7 +284,7 @@ mod tests {
             true_support: "mesentery".into(),
             resumed: Resumed::default(),
         };
-        let html = document(&result).unwrap().page();
+        let html = document(&result, None).unwrap().page();
         assert_eq!(html.matches("<svg").count(), 2);
         // Two rows of the trend, one of the errors, and four heads.
         assert_eq!(html.matches("<tr>").count(), 7);
