@@ -57,7 +57,7 @@ def run(
     """Runs the missing episodes of the campaign in `output` and returns its `result.json`.
 
     - `split`, `variation`, `by`: as `--split`, `--variation` and `--by` of `trocar evaluate`.
-    - `backend`: what bears the tissue, `tetrahedra` or `lattice` (default: the scene's).
+    - `backend`: the model of the tissue, `tetrahedra` or `lattice` (default: the scene's).
     - `ray_address`: `auto` for a running cluster, `local` for a new one on this machine,
       `host:port`; None runs without Ray.
     - `workers`: episodes at once (default: one a CPU).
@@ -157,7 +157,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--backend",
         choices=["tetrahedra", "lattice"],
-        help="what bears the tissue (default: the scene's)",
+        help="the model of the tissue (default: the scene's)",
     )
     parser.add_argument("--workers", type=int, help="episodes at once (default: one a CPU)")
     parser.add_argument(

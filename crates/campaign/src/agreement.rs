@@ -1,4 +1,4 @@
-//! Whether two backends judge policies alike: ranks of policies on both, on the same seeds.
+//! Whether two backends rank policies alike: ranks of policies on both, on the same seeds.
 
 use crate::store::EpisodeRecord;
 use crate::table::{Comparison, compare};

@@ -1,5 +1,5 @@
 //! One campaign on several tissue backends: each in a folder of its own, and one page that tells
-//! whether they judge policies alike.
+//! whether they rank policies alike.
 
 use crate::agreement::Agreement;
 use crate::campaign::Campaign;

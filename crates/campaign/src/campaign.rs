@@ -76,7 +76,7 @@ pub struct Campaign {
     pub variation: Option<VariationSet>,
     /// The source of the organs' support and tissue, instead of the scene's.
     pub tissue: Option<TissueSource>,
-    /// What bears the tissue, instead of the scene's backend.
+    /// The model of the tissue, instead of the scene's backend.
     pub backend: Option<BackendName>,
     /// Edge of the lattice's cells (mm), instead of the scene's; for the lattice only.
     pub cell_mm: Option<f64>,

@@ -116,7 +116,7 @@ pub struct Manifest {
     /// The variation between episodes.
     #[serde(default)]
     pub variation: Variation,
-    /// What bears the tissue.
+    /// The model of the tissue.
     #[serde(default)]
     pub backend: BackendName,
     /// Control period of the scene (s).

@@ -116,7 +116,7 @@ pub struct PolicyRow {
     pub lag_ms: Option<f64>,
     /// Maximum number of inverted elements in any frame.
     pub inverted_peak: usize,
-    /// What was beyond what tissue bears.
+    /// What was beyond what tissue withstands.
     pub warnings: Warnings,
     /// Reason of the policy's first failure.
     pub policy_error: Option<String>,
@@ -159,7 +159,7 @@ pub struct CampaignResult {
     /// Sum over the policies of the episodes that differ from each other in any figure by more than
     /// can be measured: 0.01 mm, 0.001 N or one control period.
     pub distinct_outcomes: usize,
-    /// What was beyond what tissue bears.
+    /// What was beyond what tissue withstands.
     pub warnings: Warnings,
     /// How often a rule switched physics off: never, since none does. Results of earlier programs
     /// have other numbers here.

@@ -92,8 +92,8 @@ pub enum Command {
     /// Write recorded episodes as a dataset of LeRobot or robomimic, rendered now and without
     /// simulation.
     Export(Export),
-    /// Watch a scene, specimen, episode or campaign in the browser while it runs, and take the
-    /// instruments in hand.
+    /// Watch a scene, specimen, episode or campaign in the browser while it runs, and take
+    /// control of the instruments.
     View(View),
     /// Reproduce a table or figure of the paper, beside the paper's numbers.
     Experiment(Experiment),

@@ -21,7 +21,7 @@ const STEPS: [f64; 3] = [0.8, 0.4, 0.2];
 
 /// What a Gaussian process foretells.
 #[derive(Clone, Debug)]
-pub(crate) struct Foretold {
+pub(crate) struct Prediction {
     /// One a number.
     pub mean: Vec<f64>,
     /// Variance of each number.
@@ -123,12 +123,12 @@ impl Emulator {
     }
 
     /// What it foretells at a point.
-    pub fn at(&self, point: &[f64]) -> Foretold {
+    pub fn at(&self, point: &[f64]) -> Prediction {
         let mut kernel: Vec<f64> = self.points.iter().map(|p| self.kernel.at(p, point)).collect();
         let mean = self.weights.iter().zip(&self.offset).map(|(w, offset)| offset + dot(w, &kernel)).collect();
         let own = self.kernel.at(point, point) + self.kernel.nugget;
         let variance = self.amplitude * (own - self.factor.distance(&mut kernel)).max(0.0);
-        Foretold { mean, variance }
+        Prediction { mean, variance }
     }
 }
 
@@ -138,7 +138,7 @@ mod tests {
     use trocar_core::Random;
 
     #[test]
-    fn a_smooth_function_is_foretold_within_its_deviation() {
+    fn a_smooth_function_is_predicted_within_its_deviation() {
         let random = Random::from_keys(&[3]);
         let points: Vec<Vec<f64>> = (0..60).map(|i| (0..2).map(|k| random.stream(k).normal(i)).collect()).collect();
         let truth = |p: &[f64]| vec![(p[0] + 0.3 * p[1]).sin(), p[0] * p[1]];
@@ -146,10 +146,10 @@ mod tests {
         let emulator = Emulator::through(&points, &values).unwrap();
         for i in 100..120 {
             let at: Vec<f64> = (0..2).map(|k| 0.7 * random.stream(k).normal(i)).collect();
-            let foretold = emulator.at(&at);
-            let off = foretold.mean.iter().zip(truth(&at)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let predicted = emulator.at(&at);
+            let off = predicted.mean.iter().zip(truth(&at)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(off < 0.05, "{off} at {at:?}");
-            assert!(off < 5.0 * foretold.variance.sqrt() + 1e-3);
+            assert!(off < 5.0 * predicted.variance.sqrt() + 1e-3);
         }
     }
 }

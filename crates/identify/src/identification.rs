@@ -1,6 +1,6 @@
 //! Identification: rounds of simulated lifts, each nearer to the measured ones.
 
-use crate::emulator::{Emulator, Foretold};
+use crate::emulator::{Emulator, Prediction};
 use crate::left_open::left_open;
 use crate::likelihood::Likelihood;
 use crate::lone_organ::{LoneOrgan, Pace};
@@ -182,7 +182,7 @@ impl Identification {
 
     /// Logarithm of the posterior at a simulated point with the likeliest error of the model.
     fn log_at(&self, point: &Point, likelihood: &Likelihood) -> f64 {
-        let exact = Foretold { mean: point.numbers.clone(), variance: 0.0 };
+        let exact = Prediction { mean: point.numbers.clone(), variance: 0.0 };
         let of = |error: f64| -0.5 * error * error + likelihood.log(&exact, error);
         let most = (-8..=20).map(|k| of(0.25 * f64::from(k))).fold(f64::NEG_INFINITY, f64::max);
         most - 0.5 * point.scores.iter().map(|s| s * s).sum::<f64>()

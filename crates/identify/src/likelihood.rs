@@ -1,4 +1,4 @@
-//! How likely measured lifts are, given foretold ones.
+//! How likely measured lifts are, given predicted ones.
 //!
 //! A landmark is off by the tracker's noise, which is its own, and by the error of the model: its
 //! mesh, its law and its alignment. That error grows with the lift, is alike in neighbouring
@@ -6,7 +6,7 @@
 //! a Gaussian process does not know is alike in the same way, and the same in all lifts.
 
 use crate::dense::Factor;
-use crate::emulator::Foretold;
+use crate::emulator::Prediction;
 use crate::observation::{Observation, PER_NEWTON};
 use glam::DVec3;
 
@@ -34,7 +34,7 @@ pub(crate) struct Likelihood {
     measured: [Vec<f64>; 3],
     /// Of each landmark: its lift, its place along the organ (m), and how far the lift goes (m).
     places: Vec<(usize, f64, f64)>,
-    /// Place of each landmark, and of each force, among the foretold numbers.
+    /// Place of each landmark, and of each force, among the predicted numbers.
     at: Vec<usize>,
     forces: Vec<(usize, DVec3)>,
 }
@@ -64,27 +64,27 @@ impl Likelihood {
     }
 
     /// Logarithm of the likelihood, without a constant, if the model's error has this score.
-    pub fn log(&self, foretold: &Foretold, error_score: f64) -> f64 {
+    pub fn log(&self, predicted: &Prediction, error_score: f64) -> f64 {
         let error = Self::model_error(error_score);
         let covariance = |i: usize, j: usize| {
             let ((a, x, way_a), (b, y, way_b)) = (self.places[i], self.places[j]);
             let shared = if a == b { 1.0 } else { COMMON };
             let alike = (-(x - y).abs() / ALIKE).exp();
             let own = if i == j { TRACKER * TRACKER } else { 0.0 };
-            own + (error * error * way_a * way_b * shared + foretold.variance) * alike
+            own + (error * error * way_a * way_b * shared + predicted.variance) * alike
         };
         let Some(factor) = Factor::of(self.places.len(), covariance) else { return f64::NEG_INFINITY };
         let mut log = -1.5 * factor.log_determinant();
         for axis in 0..3 {
-            let off = self.measured[axis].iter().zip(&self.at).map(|(m, at)| m - foretold.mean[at + axis]);
+            let off = self.measured[axis].iter().zip(&self.at).map(|(m, at)| m - predicted.mean[at + axis]);
             log -= 0.5 * factor.distance(&mut off.collect::<Vec<_>>());
         }
         for (at, force) in &self.forces {
-            let spread = foretold.variance / (PER_NEWTON * PER_NEWTON);
+            let spread = predicted.variance / (PER_NEWTON * PER_NEWTON);
             let noise = (FORCE_SHARE + error) * force.length();
             let variance = noise * noise + FORCE_NOISE * FORCE_NOISE + spread;
             for axis in 0..3 {
-                let off = force[axis] - foretold.mean[at + axis] / PER_NEWTON;
+                let off = force[axis] - predicted.mean[at + axis] / PER_NEWTON;
                 log -= 0.5 * (off * off / variance + variance.ln());
             }
         }

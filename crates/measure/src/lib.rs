@@ -31,6 +31,7 @@ mod figures;
 mod film;
 mod landmarks;
 mod lift;
+mod lift_landmarks;
 mod line;
 mod plane;
 mod profile;

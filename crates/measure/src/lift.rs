@@ -116,7 +116,7 @@ impl MeasuredLift {
         measured.profile = measured.profile_in(measured.peak);
         measured.apex =
             measured.profile.as_ref().and_then(|profile| measured.motion_at(profile.apex_at, measured.peak));
-        measured.landmarks = Landmark::all(&measured);
+        measured.landmarks = measured.find_landmarks();
         Ok(measured)
     }
 
@@ -138,12 +138,6 @@ impl MeasuredLift {
     /// The lift along the organ in a frame; `None` if too little is seen or nothing rises.
     pub fn profile_in(&self, frame: usize) -> Option<LiftProfile> {
         LiftProfile::of(&self.lifts_in(frame), SPACING)
-    }
-
-    /// How far each landmark has moved from the frame at rest to another one (m); `None` where it
-    /// is hidden.
-    pub fn landmarks_in(&self, frame: usize) -> Vec<Option<DVec3>> {
-        Landmark::motions(self, frame)
     }
 
     /// The medians of the values of the points at each place.

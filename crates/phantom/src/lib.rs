@@ -45,6 +45,6 @@ mod tests;
 pub use catalog::NAMES;
 pub use error::{Error, Result};
 pub use folder::phantoms_folder;
-pub use lifts::{HiddenSupport, LIFTS_FILE, LiftTruth, LiftsTruth};
-pub use record::{LiftOptions, RecordOptions, describe, record};
+pub use lifts::{HiddenSupport, LIFTS_FILE, LiftOptions, LiftTruth, LiftsTruth};
+pub use record::{RecordOptions, describe, record};
 pub use sensor::Sensor;

@@ -2,7 +2,7 @@
 
 use crate::anatomy::Anatomy;
 use crate::frame::{FrameSettings, RATE_HZ, record_frame};
-use crate::lifts::{self, HiddenSupport, Lifts};
+use crate::lifts::{self, LiftOptions, Lifts};
 use crate::sensor::Sensor;
 use crate::spec::{Organ, PhantomSpec, Resolution};
 use crate::static_view::StaticView;
@@ -33,28 +33,10 @@ pub struct RecordOptions {
     pub lifts: LiftOptions,
 }
 
-/// Grasp-lifts of the appendix.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LiftOptions {
-    /// Number of lifts, of 80 frames each.
-    pub count: usize,
-    /// What holds the organ besides its bed.
-    pub support: HiddenSupport,
-    /// Cell of the mesh of the lifted tissue (m).
-    pub cell: f64,
-}
-
 impl Default for RecordOptions {
     /// The paper's 60 s, seed 1, plain noise, no lifts.
     fn default() -> Self {
         Self { frames: 1800, seed: 1, sensor: Sensor::Plain, lifts: LiftOptions::default() }
-    }
-}
-
-impl Default for LiftOptions {
-    /// No lifts. Cells of 1.1 mm, half of the finest that reconstruction makes by default.
-    fn default() -> Self {
-        Self { count: 0, support: HiddenSupport::default(), cell: 1.1e-3 }
     }
 }
 

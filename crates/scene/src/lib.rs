@@ -28,6 +28,7 @@ mod schema;
 mod stages;
 mod start;
 mod task;
+mod task_definition;
 mod task_name;
 mod tissue;
 mod tissue_preset;

@@ -161,7 +161,7 @@ impl Default for Safety {
 pub struct SafetyRules {
     /// A command is shortened where tissue pushes back with `force_limit_n`.
     pub force_guard: bool,
-    /// An arm also stops where its instrument strains tissue nearly beyond what tissue bears.
+    /// An arm also stops where its instrument strains tissue nearly beyond what tissue withstands.
     pub strain_guard: bool,
 }
 

@@ -32,7 +32,7 @@ pub enum ToolContactKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Tissue {
-    /// What bears the tissue: tetrahedra, or a lattice of hexahedra around each organ.
+    /// The model of the tissue: tetrahedra, or a lattice of hexahedra around each organ.
     #[serde(skip_serializing_if = "is_tetrahedra")]
     pub backend: BackendName,
     /// Edge of the lattice's cells (mm); 4 mm if left out.
@@ -95,7 +95,7 @@ impl Default for Tissue {
     }
 }
 
-/// What bears the tissue of a scene.
+/// The model of the tissue of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BackendName {

@@ -11,6 +11,7 @@
 mod document;
 mod error;
 mod folder;
+mod identified;
 mod organ;
 mod parameter;
 mod posterior;

@@ -1,6 +1,5 @@
 //! What of an organ can be identified, and in which range.
 
-use crate::{End, Organ, Pins, Threads};
 use serde::{Deserialize, Serialize};
 
 /// Steepness of the logistic curve that maps scores to shares of a range: a score of mean 0 and
@@ -116,20 +115,5 @@ impl Parameter {
             Scale::Log => (value / low).ln() / (high / low).ln(),
         };
         ((share / (1.0 - share)).ln() / STEEPNESS).clamp(-4.0, 4.0)
-    }
-
-    /// Gives an organ the value. A held base replaces the organ's pins; threads hold it up to its tip.
-    pub fn apply(self, value: f64, organ: &mut Organ) {
-        let threads = organ.threads.unwrap_or(Threads { from: 0.5, to: 1.0, slack_m: 0.0, stiffness_n_m2: 0.0 });
-        match self {
-            Self::BaseLength => {
-                organ.pins = Pins::End { end: End::Base, length: value, band_length: 0.0, band_share: 0.0 };
-            }
-            Self::ThreadsFrom => organ.threads = Some(Threads { from: value, to: 1.0, ..threads }),
-            Self::ThreadsSlack => organ.threads = Some(Threads { slack_m: value, ..threads }),
-            Self::ThreadsStiffness => organ.threads = Some(Threads { stiffness_n_m2: value, ..threads }),
-            Self::YoungModulus => organ.material.young_modulus_pa = value,
-            Self::PoissonRatio => organ.material.poisson_ratio = value,
-        }
     }
 }

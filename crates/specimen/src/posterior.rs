@@ -1,6 +1,5 @@
 //! What lifts tell about an organ: a distribution over its support and its tissue.
 
-use crate::Organ;
 use crate::parameter::{Parameter, Scale};
 use serde::{Deserialize, Serialize};
 
@@ -143,11 +142,6 @@ impl Posterior {
     /// The values of the mean.
     pub fn middle(&self) -> Vec<(Parameter, f64)> {
         self.draw(&[])
-    }
-
-    /// Gives an organ these values.
-    pub fn apply(values: &[(Parameter, f64)], organ: &mut Organ) {
-        values.iter().for_each(|(parameter, value)| parameter.apply(*value, organ));
     }
 }
 

@@ -166,7 +166,7 @@ fn a_reset_gives_the_same_bits_whatever_was_before() {
     episode.reset(1).unwrap();
     episode.restore(&saved).unwrap();
     assert_eq!(after(&mut episode), one);
-    // An episode of another task is not gone on with.
+    // An episode of another task is not continued.
     let mut other = scene.clone();
     other.task.name = TaskName::GraspLift;
     let mut other = Episode::new(&other, &specimen, 1).unwrap();

@@ -142,7 +142,7 @@ impl ModelBuilder {
         self
     }
 
-    /// Sets what bears the tissue of all bodies; [`Backend::Tetrahedra`] otherwise. To be called
+    /// Sets the model of the tissue of all bodies; [`Backend::Tetrahedra`] otherwise. To be called
     /// before bodies are added.
     pub fn backend(mut self, backend: Backend) -> Self {
         self.backend = backend;

@@ -34,7 +34,7 @@ one. Both take these options:
 - `split`: `seen` (default) for episodes to train on, `unseen` for episodes that are kept apart,
   with anatomies of their own, or `both`. The seed of an episode decides its split: unseen ones
   have seeds from 1,000,000 on. A seed of another split is a ValueError.
-- `backend`: what bears the tissue, `tetrahedra` (`tets`) or `lattice` (default: the scene's).
+- `backend`: the model of the tissue, `tetrahedra` (`tets`) or `lattice` (default: the scene's).
 
 `gym.make` returns a `TrocarEnv` without wrappers. Seeds are at most 2^63 - 1. An environment
 belongs to the process that made it: a child made by `fork` gets a RuntimeError and must make its

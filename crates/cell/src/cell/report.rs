@@ -196,7 +196,7 @@ pub enum CellEvent {
         /// Name of the organ.
         organ: String,
     },
-    /// The instrument strained tissue beyond what tissue bears. It is reported once until the organ
+    /// The instrument strained tissue beyond what tissue withstands. It is reported once until the organ
     /// has recovered.
     Overstretched {
         /// The arm.
@@ -269,7 +269,7 @@ impl std::fmt::Display for CellEvent {
             Self::Pierced { arm, organ } => write!(f, "the {} instrument has pierced the {organ}", arm.name()),
             Self::Overstretched { arm, organ, stretch, volume } => write!(
                 f,
-                "the {} instrument strains the {organ} beyond what tissue bears (stretch {stretch:.1}, smallest element {:.1}% of its volume)",
+                "the {} instrument strains the {organ} beyond what tissue withstands (stretch {stretch:.1}, smallest element {:.1}% of its volume)",
                 arm.name(),
                 1e2 * volume
             ),

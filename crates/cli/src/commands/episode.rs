@@ -94,7 +94,7 @@ fn text(made: &EpisodeOutput) -> String {
         remarks += &format!("\n{said}");
     }
     if let Some(said) = s.warnings.described() {
-        remarks += &format!("\nbeyond what tissue bears: {said}");
+        remarks += &format!("\nbeyond what tissue withstands: {said}");
     }
     let grasp = match (s.grasp_at, s.lift_mm, s.slip_mm) {
         (Some(at), Some(lift), Some(slip)) => {

@@ -93,7 +93,7 @@ pub fn text(r: &LiftResult) -> String {
         text += &format!("\n{}: {}", arm.arm, rcm(arm));
     }
     if let Some(said) = s.warnings.described() {
-        text += &format!("\nbeyond what tissue bears: {said}");
+        text += &format!("\nbeyond what tissue withstands: {said}");
     }
     for said in [&s.why, &s.advice].into_iter().flatten() {
         text += &format!("\n{said}");

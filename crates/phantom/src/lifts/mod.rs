@@ -5,6 +5,7 @@
 //! supports that the camera does not see, and equilibria by the oracle. The lifted organ touches
 //! its bed, but not the other organs. It has no shadow in the creases while it is lifted.
 
+mod options;
 mod script;
 mod support;
 mod tissue;
@@ -13,6 +14,7 @@ mod truth;
 #[cfg(test)]
 mod tests;
 
+pub use options::LiftOptions;
 pub use support::HiddenSupport;
 pub use truth::{LIFTS_FILE, LiftTruth, LiftsTruth};
 
@@ -20,7 +22,6 @@ use crate::anatomy::Anatomy;
 use crate::frame::{FrameSettings, Layer, METAL, record_layers};
 use crate::instruments::Posture;
 use crate::paint;
-use crate::record::LiftOptions;
 use crate::spec::{PhantomSpec, Resolution};
 use crate::static_view::StaticView;
 use crate::{Error, Result};

@@ -1,7 +1,8 @@
 //! A small recording with a lift, beside its truth.
 
 use super::{HiddenSupport, LiftsTruth};
-use crate::record::{LiftOptions, RecordOptions, record_with};
+use crate::lifts::LiftOptions;
+use crate::record::{RecordOptions, record_with};
 use crate::spec::Resolution;
 use crate::{Error, Sensor, phantom_a, phantom_c};
 use glam::DVec3;

@@ -38,7 +38,7 @@ pub(super) fn check(scene: &Scene) -> Checked {
     backend(scene)
 }
 
-/// What bears the tissue, and what it cannot do.
+/// The model of the tissue, and what it cannot do.
 fn backend(scene: &Scene) -> Checked {
     let t = &scene.tissue;
     if let Some(cell) = t.cell_mm {

@@ -1,6 +1,6 @@
 //! Drawing: the values of one episode by its seed.
 
-use super::tissue::{DrawnTissue, tissue_name, tissue_named};
+use super::drawn_tissue::{DrawnTissue, tissue_name, tissue_named};
 use super::{Factor, Per, Specimens, Split, VariationSet};
 use crate::{EpisodeRandom, Error, Lens, Result, Scene, SpecimenSource, Tool};
 use serde::de::{Error as _, MapAccess, Visitor};

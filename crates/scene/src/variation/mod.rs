@@ -4,6 +4,7 @@
 mod apply;
 mod distribution;
 mod draw;
+mod drawn_tissue;
 mod factor;
 mod sets;
 mod split;
@@ -11,9 +12,10 @@ mod tissue;
 
 pub use distribution::Distribution;
 pub use draw::{Drawn, DrawnValue};
+pub use drawn_tissue::DrawnTissue;
 pub use factor::{Factor, Per};
 pub use split::Split;
-pub use tissue::{DrawnTissue, TissueSource};
+pub use tissue::TissueSource;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Error as _, MapAccess, Visitor};

@@ -1,10 +1,10 @@
 //! Support and tissue that are drawn from what lifts tell about organs.
 
 use super::Drawn;
+use super::drawn_tissue::DrawnTissue;
 use crate::{EpisodeRandom, Error, PinEnd, PinRule, Result, Scene, ThreadRule};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use trocar_specimen::{Parameter, Specimen};
 
 /// Where support and tissue of organs come from.
@@ -34,20 +34,6 @@ impl TissueSource {
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|source| source.name() == name)
     }
-}
-
-/// Values of the support and the tissue of organs, by organ and parameter.
-pub type DrawnTissue = BTreeMap<(String, Parameter), f64>;
-
-/// The name in tables of a value of an organ, such as `appendix.young_modulus_pa`.
-pub(super) fn tissue_name((organ, parameter): &(String, Parameter)) -> String {
-    format!("{organ}.{}", parameter.name())
-}
-
-/// The organ and the parameter of that name in tables.
-pub(super) fn tissue_named(name: &str) -> Option<(String, Parameter)> {
-    let (organ, parameter) = name.rsplit_once('.')?;
-    Some((organ.to_owned(), Parameter::named(parameter)?))
 }
 
 impl Scene {

@@ -14,7 +14,7 @@ use trocar_report::table::{count, fixed, or_dash};
 use trocar_scene::BackendName;
 
 /// Rollouts of the six controllers on both tissue backends, on the same seeds, and on lattices of
-/// several sizes of cells: whether they judge policies alike; resumable.
+/// several sizes of cells: whether they rank policies alike; resumable.
 #[derive(Clone, Debug, Args)]
 pub struct BackendsExperiment {
     /// The scene.

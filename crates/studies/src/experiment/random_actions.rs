@@ -70,7 +70,7 @@ pub struct RandomActionsRow {
     /// both arms.
     #[serde(default)]
     pub axes_inside: usize,
-    /// What was beyond what tissue bears.
+    /// What was beyond what tissue withstands.
     #[serde(flatten)]
     pub warnings: Warnings,
     /// How often the force guard shortened a command, over all arms and periods.
@@ -89,12 +89,12 @@ pub struct RandomActionsResult {
     /// How often a rule switched physics off, in 1,000 actions: never, since none does. Tables of
     /// earlier programs have other numbers here.
     pub suspensions_per_1000_actions: f64,
-    /// What was beyond what tissue bears, in 1,000 actions.
+    /// What was beyond what tissue withstands, in 1,000 actions.
     pub warnings_per_1000_actions: f64,
     /// Actions after which an instrument's axis was inside an organ that it had not punctured, of
     /// all seeds.
     pub axes_inside: usize,
-    /// What was beyond what tissue bears, in all seeds.
+    /// What was beyond what tissue withstands, in all seeds.
     #[serde(flatten)]
     pub warnings: Warnings,
     /// Largest number of inverted elements in any frame of any seed.
@@ -234,7 +234,7 @@ fn document(r: &RandomActionsResult) -> Document {
     let lead = format!(
         "Random valid actions in the cell of {}, from {} seeds. An instrument that comes through the surface of an \
          organ with the scene's force punctures it. No rule switches physics off. \
-         What is beyond what tissue bears is counted.",
+         What is beyond what tissue withstands is counted.",
         page::escape(&r.scene),
         r.rows.len()
     );
@@ -244,7 +244,7 @@ fn document(r: &RandomActionsResult) -> Document {
         Card::new("Actions", count(r.actions), "of all seeds"),
         Card::new("Seeds without failure", format!("{good} of {}", r.rows.len()), "no divergence, no inverted element")
             .met(good == r.rows.len()),
-        Card::new("Warnings", fixed(r.warnings_per_1000_actions, 2), "in 1,000 actions: beyond what tissue bears"),
+        Card::new("Warnings", fixed(r.warnings_per_1000_actions, 2), "in 1,000 actions: beyond what tissue withstands"),
         Card::new("Punctures", count(r.warnings.punctures), "organs punctured by instruments"),
         Card::new("Axes inside organs", count(r.axes_inside), "actions after which one is inside without a puncture")
             .met(r.axes_inside == 0),

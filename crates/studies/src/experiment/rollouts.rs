@@ -102,7 +102,7 @@ pub struct RolloutsResult {
     pub rcm_within_5_mm: usize,
     /// Largest number of inverted elements in any frame.
     pub inverted_peak: usize,
-    /// What was beyond what tissue bears, in all rollouts.
+    /// What was beyond what tissue withstands, in all rollouts.
     pub warnings: Warnings,
     /// How often a rule switched physics off: never, since none does.
     pub suspensions: usize,

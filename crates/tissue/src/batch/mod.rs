@@ -13,6 +13,7 @@
 
 mod elastic;
 mod factor;
+mod frame;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod grasps;
@@ -27,9 +28,10 @@ pub use gpu::GpuBatch;
 use crate::registers::BLOCK;
 use crate::{Error, Isa, Result, ToolMotion};
 use fearless_simd::Level;
+use frame::Schedule;
 use glam::DVec3;
 use grasps::MAX_POINTS;
-use group::{Group, Schedule};
+use group::Group;
 use rayon::prelude::*;
 use search::{Ends, Scratch};
 use std::sync::Mutex;

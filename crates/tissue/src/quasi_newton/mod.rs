@@ -34,6 +34,7 @@ mod sleep;
 mod sleeping;
 mod stiffened;
 mod stress;
+mod supernode;
 mod system;
 mod tile_parts;
 mod tiles;

@@ -6,7 +6,7 @@
 //! there in the order of the parts. In the backward half the parts only read the numbers above. How
 //! a tree is cut depends on the factor alone, so the bits do not depend on the threads.
 
-use super::tiles::{Supernode, TILE_SIZE};
+use super::supernode::{Supernode, TILE_SIZE};
 use std::ops::Range;
 
 /// Tiles of the smallest factor that is cut: below, the threads cost more than they save.

@@ -8,13 +8,10 @@
 //! The backward half is the exact transpose of the forward half, tile by tile. So rounding the
 //! factor to 16 bits leaves the preconditioner symmetric and positive definite.
 
+use super::supernode::{Supernode, TILE_SIZE};
 use super::tile_parts::{Part, Parts};
 use crate::threads::for_each;
 use fearless_simd::{Level, Simd, SimdBase, SimdCvtFloat, dispatch, f32x16, i32x16};
-use std::ops::Range;
-
-/// Rows and columns of a tile.
-pub(super) const TILE_SIZE: usize = 16;
 
 /// Greatest number in 16 bits.
 const MAX_INT16: f32 = 32767.0;
@@ -26,17 +23,6 @@ const MAX_INT16: f32 = 32767.0;
 #[repr(C, align(64))]
 struct Tile {
     words: [[i32; TILE_SIZE]; TILE_SIZE / 2],
-}
-
-/// One supernode: columns `first..first + width` of the vector, rows below by number.
-pub(super) struct Supernode {
-    pub first: usize,
-    /// A multiple of 3.
-    pub width: usize,
-    /// Rows below its diagonal, in `Tiles::rows`.
-    pub rows: Range<usize>,
-    /// Its first tile: by rows of tiles, those of the diagonal triangle first.
-    pub tiles: usize,
 }
 
 /// The packed factor.

@@ -36,7 +36,7 @@ fn lead(s: &Summary) -> String {
         ("Ended", Some(end)),
         ("Not passed", why),
         ("Note", s.advice.clone()),
-        ("Beyond what tissue bears", s.warnings.described()),
+        ("Beyond what tissue withstands", s.warnings.described()),
     ];
     let said = said.into_iter().filter_map(|(what, text)| Some(format!("<b>{what}:</b> {}.", page::escape(&text?))));
     said.collect::<Vec<_>>().join(" ")

@@ -26,7 +26,7 @@ pub(super) fn sections(lifted: &FinishedLift) -> Result<(String, String)> {
         lead += &format!(" <b>Note:</b> {}.", page::escape(advice));
     }
     if let Some(said) = s.warnings.described() {
-        lead += &format!(" <b>Beyond what tissue bears:</b> {}.", page::escape(&said));
+        lead += &format!(" <b>Beyond what tissue withstands:</b> {}.", page::escape(&said));
     }
     let title = if s.diverged { "The lift (diverged)" } else { "The lift" };
     let mut first = page::section(title, &lead, &cards(lifted)) + &over_time::pictures(&lifted.pictures)?;

@@ -58,7 +58,7 @@ pub(super) fn inverted_card(s: &Summary) -> Card {
 
 /// The card with the warnings about tissue beyond its limits.
 pub(super) fn warnings_card(s: &Summary) -> Card {
-    let note = s.warnings.described().unwrap_or_else(|| "nothing was beyond what tissue bears".to_owned());
+    let note = s.warnings.described().unwrap_or_else(|| "nothing was beyond what tissue withstands".to_owned());
     Card::new("Warnings", s.warnings.total().to_string(), note).met(s.warnings.is_empty())
 }
 

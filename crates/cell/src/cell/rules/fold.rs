@@ -3,7 +3,7 @@
 //! Tissue that snaps back may stay folded: elements that would have to invert to unfold block each
 //! other.
 
-use super::OrganWatch;
+use super::organ_watch::OrganWatch;
 use super::strain::{MAX_FRAMES_ALONE, Strain};
 use crate::cell::report::{CellEvent, PeriodLog};
 use trocar_scene::Side;

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | [`force_guard`] | tissue pushes with nearly the scene's limit, or is strained or hit fast | shortens the command, stops the arm |
 //! | [`pierce`] | the axis of an instrument is inside an organ that it has not punctured | counts, reports an event |
-//! | [`overstretch`] | tissue near an instrument is strained beyond what tissue bears | the same |
+//! | [`overstretch`] | tissue near an instrument is strained beyond what tissue withstands | the same |
 //! | [`fold`] | an organ stays strained with no instrument at it | the same |
 //!
 //! The guard acts on arms. Nothing here changes the physics of tissue. A scene turns the guard off
@@ -13,6 +13,7 @@
 mod approach;
 mod fold;
 mod force_guard;
+mod organ_watch;
 mod overstretch;
 mod pierce;
 mod strain;
@@ -21,6 +22,6 @@ mod watch;
 
 pub(super) use approach::hit_ahead;
 pub(super) use force_guard::{ForceGuard, load, place, tip_and_roll};
+pub(super) use organ_watch::OrganWatch;
 pub(super) use strain::Edges;
 pub(super) use tissue_at_arm::TissueAtArm;
-pub(super) use watch::OrganWatch;

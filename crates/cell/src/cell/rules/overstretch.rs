@@ -8,7 +8,7 @@
 //! [`MAX_STRETCH`]: super::strain::MAX_STRETCH
 //! [`MIN_VOLUME_SHARE`]: super::strain::MIN_VOLUME_SHARE
 
-use super::OrganWatch;
+use super::organ_watch::OrganWatch;
 use super::strain::Strain;
 use crate::World;
 use crate::cell::arm::ArmUnit;

@@ -3,7 +3,7 @@
 use crate::World;
 use glam::DVec3;
 
-/// Stretch of an edge beyond what tissue bears.
+/// Stretch of an edge beyond what tissue withstands.
 pub(super) const MAX_STRETCH: f64 = 5.0;
 
 /// An organ has recovered when every edge is below this stretch ...

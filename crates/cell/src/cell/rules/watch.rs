@@ -1,29 +1,12 @@
 //! Stage 6: looks at the tissue after a frame, warns, and informs the force guard.
 
+use super::organ_watch::OrganWatch;
 use super::strain::SQUEEZED;
 use super::tissue_at_arm::TissueAtArm;
 use super::{fold, overstretch, pierce};
 use crate::cell::Cell;
 use crate::cell::arm::ArmUnit;
 use crate::cell::report::PeriodLog;
-
-/// The strain record of an organ over earlier frames.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(in crate::cell) struct OrganWatch {
-    /// It was strained beyond its limits and has not recovered.
-    pub overstretched: bool,
-    /// Frames for which it has been strained without an instrument at it.
-    pub frames_alone: u32,
-}
-
-impl OrganWatch {
-    /// Its bytes, for the hash.
-    pub fn bytes(&self) -> [u8; 5] {
-        let Self { overstretched, frames_alone } = *self;
-        let [a, b, c, d] = frames_alone.to_le_bytes();
-        [a, b, c, d, u8::from(overstretched)]
-    }
-}
 
 impl Cell {
     /// Looks for instruments in organs and for tissue that is strained too much, after a frame

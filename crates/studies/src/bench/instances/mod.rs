@@ -53,7 +53,7 @@ pub struct ManyBench {
     /// Relative tolerance of the batch.
     #[arg(long, default_value_t = BatchSettings::default().relative)]
     pub relative: f64,
-    /// Stiffness of the empty parts of boundary cells over the tissue's, 0.001 to 1.
+    /// Stiffness of the empty parts of boundary cells over the tissue's, 0.001 to 0.1.
     #[arg(long, default_value_t = FILL)]
     pub fill: f64,
     /// Worker threads; all by default.
@@ -194,8 +194,8 @@ impl ManyBench {
                 self.frames, self.judged, self.judged_frames
             )));
         }
-        if !(1e-3..=1.0).contains(&self.fill) {
-            return Err(Error::Mismatch(format!("--fill {}: must be in [0.001, 1]", self.fill)));
+        if !(1e-3..=0.1).contains(&self.fill) {
+            return Err(Error::Mismatch(format!("--fill {}: must be in [0.001, 0.1]", self.fill)));
         }
         if self.gpu && !cfg!(feature = "gpu") {
             let reason = "--gpu: this build cannot use a graphics card; build it with `--features gpu`";

@@ -50,7 +50,7 @@ pub struct ElementQualityRow {
     pub slipped: usize,
     /// Whether the tissue tore out.
     pub torn: bool,
-    /// What was beyond what tissue bears.
+    /// What was beyond what tissue withstands.
     pub warnings: Warnings,
 }
 

@@ -107,7 +107,7 @@ pub struct GraspTrial {
     pub slipped: usize,
     /// Whether the tissue tore out.
     pub torn: bool,
-    /// What was beyond what tissue bears.
+    /// What was beyond what tissue withstands.
     pub warnings: Warnings,
     /// Time since the grasp (s), lift of the jaws and of the tissue (mm).
     pub lifts: Vec<(f64, f64, f64)>,
@@ -146,7 +146,7 @@ pub struct GraspDesignRow {
     pub inverted_peak: usize,
     /// Smallest volume of an element over its volume at rest in any trial.
     pub min_volume_ratio: f64,
-    /// What was beyond what tissue bears, in all trials.
+    /// What was beyond what tissue withstands, in all trials.
     pub warnings: Warnings,
     /// The paper's row.
     pub paper: Option<PaperGrasp>,

@@ -24,7 +24,7 @@ const COARSER_MM: f64 = 4.8;
 const COVERED: f64 = 0.8;
 
 /// Phantoms of known support and tissue: how often the 90% intervals of `identify` hold the truth,
-/// how wide they are, and how well other lifts are foretold.
+/// how wide they are, and how well other lifts are predicted.
 #[derive(Clone, Debug, Args)]
 pub struct IdentificationExperiment {
     /// Phantoms.

@@ -29,7 +29,7 @@ pub struct Regrasp {
     pub steps_over: usize,
     /// Largest deviation of either arm in each (mm).
     pub rcm_mm: Vec<f64>,
-    /// What was beyond what tissue bears.
+    /// What was beyond what tissue withstands.
     pub warnings: Warnings,
     /// Why it diverged.
     pub divergence: Option<String>,

@@ -21,7 +21,7 @@ pub struct PolicyOutcome {
     pub diverged: usize,
     /// Largest number of inverted elements in any frame.
     pub inverted_peak: usize,
-    /// What was beyond what tissue bears.
+    /// What was beyond what tissue withstands.
     pub warnings: Warnings,
     /// Episodes that could not begin, such as with a start out of reach.
     pub refused: usize,

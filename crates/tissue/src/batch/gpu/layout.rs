@@ -5,7 +5,7 @@
 //! numbers. The shaders know all places as constants, which are written before their text.
 
 use super::super::elastic::{LIMITED_RATIO, LIMITED_SQUARE};
-use super::super::group::Schedule;
+use super::super::frame::Schedule;
 use super::super::search::{MAX_REJECTED, MEMORY, MIN_CURVATURE, MIN_RATIO as MIN_CELL_RATIO, OVERSHOOT, SHORTENED};
 use super::super::topology::Topology;
 use super::super::warp::MIN_RATIO as TURNED_RATIO;

@@ -14,7 +14,7 @@ mod device;
 mod inverse;
 mod layout;
 
-use super::group::Schedule;
+use super::frame::Schedule;
 use super::topology::ModulusFactor;
 use super::{Batch, InstanceReport, relative};
 use crate::registers::BLOCK;

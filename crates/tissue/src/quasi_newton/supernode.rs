@@ -1,0 +1,17 @@
+//! Supernodes of a packed factor: columns with the same rows below.
+
+use std::ops::Range;
+
+/// Rows and columns of a tile.
+pub(super) const TILE_SIZE: usize = 16;
+
+/// One supernode: columns `first..first + width` of the vector, rows below by number.
+pub(super) struct Supernode {
+    pub first: usize,
+    /// A multiple of 3.
+    pub width: usize,
+    /// Rows below its diagonal, in `Tiles::rows`.
+    pub rows: Range<usize>,
+    /// Its first tile: by rows of tiles, those of the diagonal triangle first.
+    pub tiles: usize,
+}
