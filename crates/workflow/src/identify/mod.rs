@@ -147,12 +147,17 @@ impl Identifying {
         progress.advance(1);
         progress.end();
         let film = match Simulated::not_shown(&specimen, &recording.camera()) {
-            None => film(&recording, &specimen, &organ, &found, &seen, progress)?,
-            Some(why) => {
-                notes.push(format!("there is no film of a lift: {why}"));
-                None
-            }
+            // A film that cannot be made is no reason to lose what was identified.
+            None => match film(&recording, &specimen, &organ, &found, &seen, progress) {
+                Err(Error::Interrupted) => return Err(Error::Interrupted),
+                film => film.map_err(|error| error.to_string()),
+            },
+            Some(why) => Err(why.to_owned()),
         };
+        let film = film.unwrap_or_else(|why| {
+            notes.push(format!("there is no film of a lift: {why}"));
+            None
+        });
         notes.extend(said(&found, identification.lifts.iter().any(|l| l.force.is_some())));
         if let Some(organ) = specimen.organs.iter_mut().find(|o| o.name == name) {
             Posterior::apply(&found.best, organ);

@@ -15,7 +15,7 @@ use trocar_report::colors::VIEW_GROUND;
 const ALONE: [usize; 2] = [760, 570];
 const BESIDE: [usize; 2] = [540, 405];
 
-/// Gap between panels, height of the titles and of what is below the panels (px).
+/// Gap between panels, height of the titles, and height of the part below the panels (px).
 const GAP: usize = 8;
 const TITLE: usize = 32;
 const BELOW: usize = 250;
@@ -70,7 +70,9 @@ impl FrameLayout {
     ) -> Result<ColorImage> {
         let [width, height] = self.size();
         let mut canvas = Canvas::new(width, height, VIEW_GROUND)?;
-        let titles = [(format!("Filmed, lift {}", shown.number), FILMED), ("Simulated".to_owned(), SIMULATED)];
+        // A lift alone may be of an episode, which nobody filmed.
+        let first = if simulated.is_some() { "Filmed" } else { "Measured" };
+        let titles = [(format!("{first}, lift {}", shown.number), FILMED), ("Simulated".to_owned(), SIMULATED)];
         for (k, (picture, (title, color))) in panels.iter().zip(&titles).enumerate() {
             let left = k * (picture.width + GAP);
             canvas.paste(picture, [left, TITLE]);
@@ -137,7 +139,8 @@ fn figures(canvas: &mut Canvas, from: DVec2, measured: &Moment, simulated: Optio
     };
     let both = |of: &dyn Fn(&Moment) -> String| [Some((of(measured), TEXT)), simulated.map(|m| (of(m), TEXT))];
     let second = simulated.map(|_| ("simulated".to_owned(), SIMULATED));
-    row(0.0, "mm", [Some(("filmed".to_owned(), FILMED)), second]);
+    let first = if simulated.is_some() { "filmed" } else { "measured" };
+    row(0.0, "mm", [Some((first.to_owned(), FILMED)), second]);
     row(1.0, "lift", both(&apex));
     row(2.0, "d50", both(&d50));
     if let Some(simulated) = simulated {

@@ -32,7 +32,7 @@ const USUAL_HZ: f64 = 30.0;
 /// Time for which the last frame stays (ms).
 const LAST_MS: i32 = 1500;
 
-/// Colours of what is filmed and of what is simulated.
+/// Colours of the filmed and of the simulated lift.
 pub const FILMED: [u8; 3] = colors::organ(1);
 /// See [`FILMED`].
 pub const SIMULATED: [u8; 3] = colors::organ(0);

@@ -179,7 +179,7 @@ impl Device {
         Ok(own)
     }
 
-    /// Writes numbers of what varies by instance from an offset (bytes) on.
+    /// Writes numbers of the instances, beginning at an offset (bytes).
     pub fn write(&self, offset: u64, numbers: &[f32]) {
         self.queue.write_buffer(&self.data, offset, cast_slice(numbers));
     }
@@ -213,7 +213,7 @@ impl Device {
         Ok(cast_slice::<u8, u32>(&bytes)[1])
     }
 
-    /// Reads numbers of what varies by instance.
+    /// Reads numbers of the instances.
     ///
     /// # Errors
     /// [`Error::Gpu`] if the card was lost.

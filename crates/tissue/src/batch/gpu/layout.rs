@@ -172,7 +172,7 @@ impl Layout {
         (layout, shared)
     }
 
-    /// Bytes of the array of what varies by instance.
+    /// Bytes of the array with the numbers of the instances.
     pub fn bytes(&self) -> u64 {
         4 * self.rows as u64 * self.columns as u64
     }
