@@ -10,6 +10,7 @@ mod error;
 pub mod figures;
 pub mod overlays;
 pub mod page;
+pub mod picture_colors;
 pub mod plots;
 pub mod table;
 pub mod views;

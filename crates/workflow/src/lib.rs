@@ -15,7 +15,6 @@ pub mod measure;
 pub mod pages;
 pub mod paper;
 pub mod phantoms;
-mod picture_colors;
 mod reconstruct;
 mod recorder;
 mod rendering;

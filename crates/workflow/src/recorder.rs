@@ -1,6 +1,6 @@
 //! Pictures of an episode while it runs, for its page.
 
-use crate::picture_colors::{averaged, shown};
+use trocar_report::picture_colors::{averaged, shown};
 use crate::video::webp;
 use crate::{Error, Result};
 use std::time::{Duration, Instant};

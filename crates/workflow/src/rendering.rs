@@ -10,7 +10,7 @@ pub use script::ScriptedLift;
 
 use crate::episode_replay::EpisodeReplay;
 use crate::phantoms::{recorded_specimen, scene_specimen};
-use crate::picture_colors::{averaged, label_color, shown};
+use trocar_report::picture_colors::{averaged, label_color, shown};
 use crate::video::VideoWriter;
 use crate::{Error, Result, check_interrupted};
 use glam::DVec3;

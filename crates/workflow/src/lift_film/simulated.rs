@@ -2,7 +2,7 @@
 
 use super::moment::Moment;
 use super::panel::{Panel, Seen};
-use crate::picture_colors::averaged;
+use trocar_report::picture_colors::averaged;
 use crate::{Error, Result};
 use glam::DVec3;
 use std::sync::Arc;

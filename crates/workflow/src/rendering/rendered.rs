@@ -1,6 +1,6 @@
 //! The figures that `trocar render` prints.
 
-use crate::picture_colors::label_color;
+use trocar_report::picture_colors::label_color;
 use serde::Serialize;
 use trocar_sensors::CameraRig;
 

@@ -3,7 +3,7 @@
 use trocar_camera::ColorImage;
 
 /// The picture reduced by the factor `finer`, by averaging.
-pub(crate) fn averaged(image: &ColorImage, finer: usize) -> ColorImage {
+pub fn averaged(image: &ColorImage, finer: usize) -> ColorImage {
     if finer <= 1 {
         return image.clone();
     }
@@ -19,7 +19,7 @@ pub(crate) fn averaged(image: &ColorImage, finer: usize) -> ColorImage {
 }
 
 /// A colour per label. Hues are steps of the golden angle, which makes neighbours differ most.
-pub(crate) fn label_color(label: u16) -> [u8; 3] {
+pub fn label_color(label: u16) -> [u8; 3] {
     if label == 0 {
         return [0; 3];
     }
@@ -38,7 +38,7 @@ pub(crate) fn label_color(label: u16) -> [u8; 3] {
 }
 
 /// Depth in colours from near (bright) to far; black without depth.
-pub(crate) fn shown(depth: &trocar_camera::DepthImage) -> ColorImage {
+pub fn shown(depth: &trocar_camera::DepthImage) -> ColorImage {
     // Depth is rounded to millimetres, so that a flat area has one rank.
     let whole = |d: f32| (d * 1e3).round() * 1e-3;
     let mut valid: Vec<f32> = depth.depth.iter().copied().filter(|d| *d > 0.0).map(whole).collect();
