@@ -1,12 +1,12 @@
 //! Pictures of an episode while it runs, for its page.
 
-use trocar_report::picture_colors::{averaged, shown};
 use crate::video::webp;
 use crate::{Error, Result};
 use std::time::{Duration, Instant};
 use trocar_camera::ColorImage;
 use trocar_cell::{Cell, CellEvent};
 use trocar_render::RenderSettings;
+use trocar_report::picture_colors::{averaged, shown};
 use trocar_sensors::{CameraNoise, CameraRig, DepthNoise};
 use trocar_task::{Episode, Step};
 

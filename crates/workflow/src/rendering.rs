@@ -10,7 +10,6 @@ pub use script::ScriptedLift;
 
 use crate::episode_replay::EpisodeReplay;
 use crate::phantoms::{recorded_specimen, scene_specimen};
-use trocar_report::picture_colors::{averaged, label_color, shown};
 use crate::video::VideoWriter;
 use crate::{Error, Result, check_interrupted};
 use glam::DVec3;
@@ -20,6 +19,7 @@ use std::path::{Path, PathBuf};
 use trocar_camera::ColorImage;
 use trocar_core::Progress;
 use trocar_render::{Picture, RenderSettings};
+use trocar_report::picture_colors::{averaged, label_color, shown};
 use trocar_scene::Scene;
 use trocar_sensors::{CameraNoise, CameraRig, DepthNoise, OUTSIDE, PICTURE_SIDES};
 use trocar_specimen::Specimen;

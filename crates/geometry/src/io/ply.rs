@@ -8,18 +8,26 @@ use ply_rs_bw::ply::{ElementDef, Header, Property, PropertyAccess, PropertyAcces
 use std::io::Cursor;
 use std::path::Path;
 
+/// An element of the file, with what is used of it: a vertex has a place and a colour, a face has
+/// corners. One type for all, because the parser is compiled anew for each.
 #[derive(Default)]
-struct Vertex {
+struct Element {
     position: DVec3,
     color: [u8; 3],
+    /// `None` if they are not a list of non-negative integers.
+    corners: Option<Vec<u32>>,
 }
 
-impl PropertyAccess for Vertex {
+impl PropertyAccess for Element {
     fn new() -> Self {
         Self::default()
     }
 
     fn set_property(&mut self, key: &str, property: Property) -> PropertyAccessResult {
+        if is_corner_list(key) {
+            self.corners = property.to_u32_list();
+            return PropertyAccessResult::Set;
+        }
         let color = property.to_u8_color_lossy();
         match (key, number(&property), color) {
             ("x", Some(x), _) => self.position.x = x,
@@ -30,38 +38,6 @@ impl PropertyAccess for Vertex {
             ("blue" | "diffuse_blue", _, Some(c)) => self.color[2] = c,
             _ => {}
         }
-        PropertyAccessResult::Set
-    }
-}
-
-/// A face of the file; `None` if its corners are not a list of non-negative integers.
-#[derive(Default)]
-struct Face {
-    corners: Option<Vec<u32>>,
-}
-
-impl PropertyAccess for Face {
-    fn new() -> Self {
-        Self::default()
-    }
-
-    fn set_property(&mut self, key: &str, property: Property) -> PropertyAccessResult {
-        if is_corner_list(key) {
-            self.corners = property.to_u32_list();
-        }
-        PropertyAccessResult::Set
-    }
-}
-
-/// An element that is ignored.
-struct Skipped;
-
-impl PropertyAccess for Skipped {
-    fn new() -> Self {
-        Self
-    }
-
-    fn set_property(&mut self, _: &str, _: Property) -> PropertyAccessResult {
         PropertyAccessResult::Set
     }
 }
@@ -82,20 +58,20 @@ fn number(property: &Property) -> Option<f64> {
 /// Reads vertices, their colours (if present) and faces. Polygons become fans of triangles.
 pub(super) fn parse(bytes: &[u8]) -> Parsed<TriMesh> {
     let mut reader = Reader::new(Cursor::new(bytes));
-    let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(|e| e.to_string())?;
+    let header = Parser::<Element>::new().read_header(&mut reader).map_err(|e| e.to_string())?;
     check(&header, bytes.len())?;
     let mut mesh = TriMesh::default();
     for element in header.elements.values() {
         match element.name.as_str() {
             "vertex" => {
-                let vertices = read::<Vertex>(&mut reader, element, &header)?;
+                let vertices = read(&mut reader, element, &header)?;
                 mesh.vertices = vertices.iter().map(|v| v.position).collect();
                 if has(element, &["red", "diffuse_red"]) {
                     mesh.colors = vertices.iter().map(|v| v.color).collect();
                 }
             }
             "face" => {
-                for (f, face) in read::<Face>(&mut reader, element, &header)?.iter().enumerate() {
+                for (f, face) in read(&mut reader, element, &header)?.iter().enumerate() {
                     let corners = face.corners.as_deref().unwrap_or_default();
                     if corners.len() < 3 {
                         return Err(format!("face {f} must list at least three non-negative vertex indices"));
@@ -104,7 +80,7 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed<TriMesh> {
                 }
             }
             _ => {
-                read::<Skipped>(&mut reader, element, &header)?;
+                read(&mut reader, element, &header)?;
             }
         }
     }
@@ -138,12 +114,8 @@ fn has(element: &ElementDef, names: &[&str]) -> bool {
     names.iter().any(|&name| element.properties.contains_key(name))
 }
 
-fn read<E: PropertyAccess>(
-    reader: &mut Reader<Cursor<&[u8]>>,
-    element: &ElementDef,
-    header: &Header,
-) -> Parsed<Vec<E>> {
-    Parser::<E>::new().read_payload_for_element(reader, element, header).map_err(|e| e.to_string())
+fn read(reader: &mut Reader<Cursor<&[u8]>>, element: &ElementDef, header: &Header) -> Parsed<Vec<Element>> {
+    Parser::new().read_payload_for_element(reader, element, header).map_err(|e| e.to_string())
 }
 
 /// Writes a binary little-endian `.ply` in metres (coordinates as `double`), with vertex colours if

@@ -2,7 +2,6 @@
 
 use super::moment::Moment;
 use super::panel::{Panel, Seen};
-use trocar_report::picture_colors::averaged;
 use crate::{Error, Result};
 use glam::DVec3;
 use std::sync::Arc;
@@ -11,6 +10,7 @@ use trocar_core::{Pose, Progress};
 use trocar_geometry::{Skin, TriMesh};
 use trocar_identify::{Grip, Lifted, LoneOrgan, Pace, SeenLift};
 use trocar_render::RenderSettings;
+use trocar_report::picture_colors::averaged;
 use trocar_sensors::CameraRig;
 use trocar_specimen::Specimen;
 

@@ -1,7 +1,7 @@
 //! The figures that `trocar render` prints.
 
-use trocar_report::picture_colors::label_color;
 use serde::Serialize;
+use trocar_report::picture_colors::label_color;
 use trocar_sensors::CameraRig;
 
 /// The figures of a picture or video.
