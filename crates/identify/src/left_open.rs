@@ -1,9 +1,9 @@
 //! What the simulation's law and mesh leave open, however well it explains lifts.
 //!
 //! Another law, or another mesh, with other values explains lifts as well: the values make up for
-//! it. So lifts that are explained well do not tell these parts of the error. The deviations here are
-//! about the distances of identified from true values in eight phantoms (seeds 101 to 108) whose
-//! true tissue had another law and a finer mesh.
+//! it. So lifts that are explained well do not tell these parts of the error. The deviations here
+//! are about the distances of identified from true values in eight phantoms (seeds 101 to 108)
+//! whose true tissue had another law and a finer mesh.
 
 use trocar_specimen::{Parameter, Prior};
 
@@ -13,8 +13,8 @@ const BASE: f64 = 0.01;
 const FROM: f64 = 0.05;
 /// Of their slack (m).
 const SLACK: f64 = 1.5e-3;
-/// Of the logarithm of their stiffness: tissue yields at the node where a thread begins, and less in
-/// a coarse mesh.
+/// Of the logarithm of their stiffness: tissue yields at the node where a thread begins, and less
+/// in a coarse mesh.
 const STIFFNESS: f64 = 0.6;
 /// Of the logarithm of Young's modulus: laws differ where strains are large.
 const MODULUS: f64 = 0.4;

@@ -2,15 +2,16 @@
 //!
 //! A landmark is off by the tracker's noise, which is its own, and by the error of the model: its
 //! mesh, its law and its alignment. That error grows with the lift, is alike in neighbouring
-//! landmarks, and most of it is the same in all lifts. Its size is inferred with the parameters. What
-//! a Gaussian process does not know is alike in the same way, and the same in all lifts.
+//! landmarks, and most of it is the same in all lifts. Its size is inferred with the parameters.
+//! What a Gaussian process does not know is alike in the same way, and the same in all lifts.
 
 use crate::dense::Factor;
 use crate::emulator::Prediction;
 use crate::observation::{Observation, PER_NEWTON};
 use glam::DVec3;
 
-/// Noise of a tracked landmark along an axis (m): trackers of phantoms are 0.4 mm off in the median.
+/// Noise of a tracked landmark along an axis (m): trackers of phantoms are 0.4 mm off in the
+/// median.
 pub(crate) const TRACKER: f64 = 0.25e-3;
 
 /// Length along the organ over which errors of the model are alike (m).

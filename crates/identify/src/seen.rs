@@ -26,8 +26,8 @@ pub struct SeenLift {
 }
 
 impl SeenLift {
-    /// Aligns the centreline of a lift at rest with that of the organ (paper section VII-F: rigidly,
-    /// places of the same arc length). `None` if too little of the lift is seen.
+    /// Aligns the centreline of a lift at rest with that of the organ (paper section VII-F:
+    /// rigidly, places of the same arc length). `None` if too little of the lift is seen.
     pub fn of(lift: MeasuredLift, organ: &LoneOrgan) -> Option<Self> {
         let (profile, apex) = (lift.profile.as_ref()?, lift.apex?);
         // The visible line ends half a width before each end of the organ.

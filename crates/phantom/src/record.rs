@@ -44,8 +44,8 @@ impl Default for RecordOptions {
 /// ground truth in `truth/`: the picture without instruments and noise, and the organs' surfaces in
 /// the camera frame (m).
 ///
-/// With `options.lifts`, the recording continues with grasp-lifts of the appendix. Their truth is in
-/// `truth/lifts.toml`, see [`LiftsTruth`](crate::LiftsTruth).
+/// With `options.lifts`, the recording continues with grasp-lifts of the appendix. Their truth is
+/// in `truth/lifts.toml`, see [`LiftsTruth`](crate::LiftsTruth).
 ///
 /// The masks of the organs are ground truth too: the pixels that show the organ in the picture
 /// without instruments. Within the mask of an organ, `truth/depth.png` is the depth of that organ's

@@ -1,6 +1,6 @@
-//! Removes the noise of a path-traced picture: an edge-avoiding wavelet filter (Dammertz and others,
-//! "Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination Filtering", 2010) whose
-//! tolerance of colour is the noise of the pixel (Schied and others, "Spatiotemporal
+//! Removes the noise of a path-traced picture: an edge-avoiding wavelet filter (Dammertz and
+//! others, "Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination Filtering", 2010)
+//! whose tolerance of colour is the noise of the pixel (Schied and others, "Spatiotemporal
 //! Variance-Guided Filtering", 2017). It averages light without the surface's colour, over pixels
 //! whose surface has the same colour, normal and place.
 
@@ -24,8 +24,8 @@ const NORMAL_DOUBLINGS: u32 = 6;
 /// Least albedo by which light is divided.
 const MIN_ALBEDO: f32 = 0.02;
 
-/// A weight is (1 - this times the difference) to the power of 16. That is nearly an exponential, and
-/// it has the same bits on any machine.
+/// A weight is (1 - this times the difference) to the power of 16. That is nearly an exponential,
+/// and it has the same bits on any machine.
 const FALLOFF: f32 = 1.0 / 16.0;
 
 /// What the paths of a pixel saw first, on average, and what they carried.

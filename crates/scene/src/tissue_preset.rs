@@ -36,8 +36,9 @@ impl TissuePreset {
         }
     }
 
-    /// Young's modulus (Pa). Where a shear modulus was measured it is three times that, as in tissue
-    /// that keeps its volume; of bowel, the geometric mean of the moduli along and around it.
+    /// Young's modulus (Pa). Where a shear modulus was measured it is three times that, as in
+    /// tissue that keeps its volume; of bowel, the geometric mean of the moduli along and around
+    /// it.
     pub fn young_modulus_pa(self) -> f64 {
         match self {
             Self::Appendix => 12e3,

@@ -3,7 +3,8 @@
 use crate::{End, Organ, Parameter, Pins, Posterior, Threads};
 
 impl Parameter {
-    /// Gives an organ the value. A held base replaces the organ's pins; threads hold it up to its tip.
+    /// Gives an organ the value. A held base replaces the organ's pins; threads hold it up to its
+    /// tip.
     pub fn apply(self, value: f64, organ: &mut Organ) {
         let threads = organ.threads.unwrap_or(Threads { from: 0.5, to: 1.0, slack_m: 0.0, stiffness_n_m2: 0.0 });
         match self {

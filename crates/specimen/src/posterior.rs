@@ -41,7 +41,8 @@ pub struct Prior {
     pub range: [f64; 2],
     /// The 5%, 50% and 95% quantiles of its value.
     pub interval: [f64; 3],
-    /// Width of the 90% interval over that of the prior; of logarithms where these are spread evenly.
+    /// Width of the 90% interval over that of the prior; of logarithms where these are spread
+    /// evenly.
     pub width: f64,
 }
 

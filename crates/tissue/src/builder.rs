@@ -127,8 +127,8 @@ impl ModelBuilder {
         self
     }
 
-    /// Hangs masses (kg) on nodes of the bodies that are added after this; none otherwise. They fall
-    /// and swing with the node. Tetrahedra only.
+    /// Hangs masses (kg) on nodes of the bodies that are added after this; none otherwise. They
+    /// fall and swing with the node. Tetrahedra only.
     pub fn point_masses(mut self, masses: &[(u32, f64)]) -> Self {
         self.point_masses = masses.to_vec();
         self

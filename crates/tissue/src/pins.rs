@@ -36,8 +36,8 @@ pub fn end(
 /// The lowest node along `up` of each of the slices that divide a part of a tubular organ, with the
 /// slice's length in the organ coordinate: where the threads of a sheet below it begin.
 ///
-/// `s` is the organ coordinate of each node, the part is from `from` to `to`, and slices are as long
-/// as `longest` at most. Slices without nodes have none.
+/// `s` is the organ coordinate of each node, the part is from `from` to `to`, and slices are as
+/// long as `longest` at most. Slices without nodes have none.
 pub fn lowest_along(nodes: &[DVec3], s: &[f64], up: DVec3, [from, to]: [f64; 2], longest: f64) -> Vec<(u32, f64)> {
     let count = ((to - from) / longest).ceil().max(1.0) as usize;
     let step = (to - from) / count as f64;

@@ -13,8 +13,8 @@ use crate::{
 };
 use glam::DVec3;
 
-/// A single body of fewer nodes is stepped on one thread: handing a small model to a pool costs more
-/// than a frame.
+/// A single body of fewer nodes is stepped on one thread: handing a small model to a pool costs
+/// more than a frame.
 const MIN_THREADED_NODES: usize = 4000;
 
 /// Advances states of one model.
@@ -108,8 +108,8 @@ impl Stepper {
     /// with the same bits as in a new stepper.
     ///
     /// # Errors
-    /// A model of another backend, and threads that the system refuses; the stepper then still steps
-    /// the old model.
+    /// A model of another backend, and threads that the system refuses; the stepper then still
+    /// steps the old model.
     pub fn set_model(&mut self, model: &Model) -> Result<()> {
         if self.backend != model.backend {
             return Err(Error::Model(
@@ -278,8 +278,8 @@ impl Stepper {
     }
 }
 
-/// The solvers of these settings. Those of lattices are one method, which takes substeps and tolerances
-/// from them.
+/// The solvers of these settings. Those of lattices are one method, which takes substeps and
+/// tolerances from them.
 fn solvers(backend: Backend, settings: SolverSettings, dt: f64) -> Box<dyn SolverSet> {
     if let Backend::Lattice(_) = backend {
         return Box::new(BodySolvers::new(move |body, _| LatticeSolver::new(settings, body)));

@@ -16,8 +16,8 @@ pub(crate) fn for_each<T: Send>(items: &mut [T], work: impl Fn(&mut T) + Send + 
     }
 }
 
-/// Calls `work` with parts of at least `least` items, at most eight of equal size, and the number of
-/// each part's first one.
+/// Calls `work` with parts of at least `least` items, at most eight of equal size, and the number
+/// of each part's first one.
 pub(crate) fn in_parts<T: Send>(items: &mut [T], least: usize, work: impl Fn(usize, &mut [T]) + Send + Sync) {
     let parts = (items.len() / least).clamp(1, MAX_PARTS);
     if parts == 1 || !has_threads() {

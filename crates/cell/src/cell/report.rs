@@ -196,8 +196,8 @@ pub enum CellEvent {
         /// Name of the organ.
         organ: String,
     },
-    /// The instrument strained tissue beyond what tissue withstands. It is reported once until the organ
-    /// has recovered.
+    /// The instrument strained tissue beyond what tissue withstands. It is reported once until the
+    /// organ has recovered.
     Overstretched {
         /// The arm.
         arm: Side,

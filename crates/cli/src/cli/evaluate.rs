@@ -35,8 +35,9 @@ pub struct Evaluate {
     /// says by default.
     #[arg(long, value_name = "SOURCE", value_parser = super::tissue_source)]
     pub tissue: Option<TissueSource>,
-    /// The model of the tissue: tetrahedra (tets) or lattice; the scene's by default. Given twice, the
-    /// campaign runs on both, in a folder each, and a page tells whether they rank policies alike.
+    /// The model of the tissue: tetrahedra (tets) or lattice; the scene's by default. Given twice,
+    /// the campaign runs on both, in a folder each, and a page tells whether they rank policies
+    /// alike.
     #[arg(long = "backend", value_name = "BACKEND", value_parser = super::backend)]
     pub backends: Vec<BackendName>,
     /// Show success by these in the terminal, separated by commas: factors (modulus_kpa), groups

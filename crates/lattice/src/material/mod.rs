@@ -69,8 +69,8 @@ impl Material {
     }
 
     /// The part of the stress (Pa) at F that limits strain: the barrier below a fifth of the rest
-    /// volume and the stiffness of stretches above 4. None where neither acts. It acts at the points
-    /// of the deviatoric part.
+    /// volume and the stiffness of stretches above 4. None where neither acts. It acts at the
+    /// points of the deviatoric part.
     pub fn limit_stress(&self, f: DMat3) -> Option<DMat3> {
         self.limits().stress(f).map(|(_, stress)| stress)
     }

@@ -71,8 +71,8 @@ pub struct Drawn {
     pub specimen: SpecimenSource,
     /// The numbers, in the order of the factors, then by part and axis.
     pub values: Vec<DrawnValue>,
-    /// Support and tissue of organs, where they are drawn from posteriors. In tables a value has the
-    /// name `ORGAN.PARAMETER`.
+    /// Support and tissue of organs, where they are drawn from posteriors. In tables a value has
+    /// the name `ORGAN.PARAMETER`.
     pub tissue: DrawnTissue,
 }
 

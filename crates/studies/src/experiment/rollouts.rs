@@ -143,8 +143,8 @@ impl Study for RolloutsExperiment {
     }
 }
 
-/// The campaign of the six controllers without variation: `rollouts` in all, from `seed` on, `jobs` at
-/// once.
+/// The campaign of the six controllers without variation: `rollouts` in all, from `seed` on, `jobs`
+/// at once.
 pub(super) fn campaign(scene: &SceneChoice, rollouts: usize, seed: u64, jobs: usize) -> Result<Campaign> {
     Ok(Campaign {
         scene: scene.scene.clone(),

@@ -140,8 +140,8 @@ impl Batch {
     ///
     /// # Errors
     /// [`Error::Body`] for a body whose law is not stable neo-Hookean, whose lattice has a fill
-    /// below 0.001, or whose stiffness is singular; [`Error::Model`] for settings and instances out of range, and threads that cannot
-    /// start.
+    /// below 0.001, or whose stiffness is singular; [`Error::Model`] for settings and instances out
+    /// of range, and threads that cannot start.
     pub fn new(body: &LatticeBody, instances: &[Instance], settings: BatchSettings, threads: usize) -> Result<Self> {
         settings.check()?;
         instances.iter().enumerate().try_for_each(|(k, instance)| instance.check(k))?;

@@ -215,8 +215,8 @@ impl Start {
         start
     }
 
-    /// Ends the substep at `x`: v + h g + (x - y)/h, which equals (x - x0)/h for implicit Euler, and
-    /// is exact in free flight.
+    /// Ends the substep at `x`: v + h g + (x - y)/h, which equals (x - x0)/h for implicit Euler,
+    /// and is exact in free flight.
     fn end(&self, x: &[DVec3], h: f64, lattice: &mut LatticeState) {
         for (i, x) in x.iter().enumerate() {
             lattice.velocities[i] += self.flight + (*x - self.predictor[i]) / h;

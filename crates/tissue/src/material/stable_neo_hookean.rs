@@ -11,9 +11,9 @@ use glam::DMat3;
 /// term, which only matters at the origin of F. The energy is finite for flat elements, though, and
 /// an element between a rigid grasp and pinned tissue can be pulled flat; so a barrier lambda'/2
 /// ln(J/0.2)^2 is added below a fifth of the rest volume. Beyond a stretch of 4 tissue becomes
-/// stiff: mu/2 (s^2 - 16)^2 is added for each principal stretch s there. The linearisation at rest is 2 mu eps +
-/// (lambda' - mu) tr(eps) I, so lambda' = lambda + mu makes small strains obey Hooke's law with
-/// Lame's mu and lambda exactly.
+/// stiff: mu/2 (s^2 - 16)^2 is added for each principal stretch s there. The linearisation at rest
+/// is 2 mu eps + (lambda' - mu) tr(eps) I, so lambda' = lambda + mu makes small strains obey
+/// Hooke's law with Lame's mu and lambda exactly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StableNeoHookean {
     /// Shear modulus (Pa).

@@ -4,8 +4,8 @@
 //! Tissue that a grasp pulls against its pins is squeezed flat beside it, or stretched many times.
 //! The matrix has the stiffness at rest, and each such element is some fifty times as stiff along
 //! one direction: the gradient g of its volume ratio, or of the square of a principal stretch. Its
-//! additional stiffness is k g g', with k its volume times the increase of the energy's second derivative: one
-//! rank of the low-rank update per element.
+//! additional stiffness is k g g', with k its volume times the increase of the energy's second
+//! derivative: one rank of the low-rank update per element.
 
 use super::elements::Elements;
 use super::iterate::position;

@@ -45,9 +45,9 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// Cuts the tree of `supernodes`, whose rows below the diagonal are the numbers `rows`, first of
-    /// three each, and which have `tiles` in all. Numbers of the parts' supernodes then refer to the
-    /// parts' vectors. `buffer` is room for the longest column of row tiles.
+    /// Cuts the tree of `supernodes`, whose rows below the diagonal are the numbers `rows`, first
+    /// of three each, and which have `tiles` in all. Numbers of the parts' supernodes then refer to
+    /// the parts' vectors. `buffer` is room for the longest column of row tiles.
     pub fn cut(supernodes: &mut [Supernode], rows: &mut [u32], tiles: usize, buffer: usize) -> Self {
         if tiles < MIN_TILES {
             return Self::default();

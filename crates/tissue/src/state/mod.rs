@@ -15,8 +15,8 @@ use crate::{Body, Grasp, Hole, Model};
 use glam::{DVec3, Vec3A};
 use xxhash_rust::xxh3::Xxh3;
 
-/// Positions, velocities, grasps and holes at one instant. Cloning a state saves it; assigning the clone
-/// restores it exactly.
+/// Positions, velocities, grasps and holes at one instant. Cloning a state saves it; assigning the
+/// clone restores it exactly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
     /// Simulated time (s).
@@ -83,8 +83,8 @@ impl State {
     }
 
     /// Copies positions, velocities and the anchors of friction on supports from another state.
-    /// Other friction, the grasps and the holes stay. Returns false, and changes nothing, if the other state
-    /// has other bodies.
+    /// Other friction, the grasps and the holes stay. Returns false, and changes nothing, if the
+    /// other state has other bodies.
     pub fn copy_motion(&mut self, other: &Self) -> bool {
         let sizes = |state: &Self| state.bodies.iter().map(|body| body.x.len()).collect::<Vec<_>>();
         if sizes(self) != sizes(other) {

@@ -1,5 +1,5 @@
-//! Supports of a body: one-sided surfaces with a quadratic penalty and Coulomb friction, and threads
-//! that hold it.
+//! Supports of a body: one-sided surfaces with a quadratic penalty and Coulomb friction, and
+//! threads that hold it.
 
 mod field;
 mod tether;

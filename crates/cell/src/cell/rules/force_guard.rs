@@ -7,8 +7,8 @@
 //!
 //! - Commands, 30 times a second: the part of a motion against the load becomes shorter as the load
 //!   nears the limit; beyond the limit the instrument retracts. Under a load of tissue the part
-//!   aside becomes slow, because what lies beside may be harder. The motion is measured from the arm's reference, because commands are
-//!   up to 20 mm ahead of a fast arm.
+//!   aside becomes slow, because what lies beside may be harder. The motion is measured from the
+//!   arm's reference, because commands are up to 20 mm ahead of a fast arm.
 //! - Stops, 60 times a second: an arm that would pass the limit before the next chance to stop it
 //!   stops at once, and so does one that is about to hit tissue fast ([`super::approach`]). A
 //!   reference that stands or retreats is not stopped: a stop would undo the retreat.
@@ -16,10 +16,10 @@
 //! The stiffness seen so far limits each step, as in [`crate::Jaw`]: a fixed gain would oscillate
 //! on stiff tissue or be slow on soft tissue.
 //!
-//! The load is the force on the instrument and the torque of tissue about its shaft, as a force at a
-//! lever: an open jaw that rolls into tissue presses on it as one that is pushed does. So loads and
-//! motions have four numbers. Where the strain of tissue is nearer to its limit than the force is
-//! to the force limit, the load has that share of the limit.
+//! The load is the force on the instrument and the torque of tissue about its shaft, as a force at
+//! a lever: an open jaw that rolls into tissue presses on it as one that is pushed does. So loads
+//! and motions have four numbers. Where the strain of tissue is nearer to its limit than the force
+//! is to the force limit, the load has that share of the limit.
 
 use super::TissueAtArm;
 use crate::FRAME;

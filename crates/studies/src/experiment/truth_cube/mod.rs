@@ -116,7 +116,8 @@ impl Trial {
         let elements = self.elements(cube);
         let (mut median_mm, mut rms_mm) = (ByStrain::new(), ByStrain::new());
         for strain in &beads.strains {
-            // A law may have no equilibrium there: St. Venant-Kirchhoff tissue gives way when pressed.
+            // A law may have no equilibrium there: St. Venant-Kirchhoff tissue gives way when
+            // pressed.
             let Ok(predicted) = cube.predict(&elements, self.law, strain) else { continue };
             let [median, rms] = figures(distances(&predicted, strain));
             median_mm.insert(strain.percent.clone(), median);

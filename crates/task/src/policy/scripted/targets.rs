@@ -23,8 +23,8 @@ const CARRY: f64 = 0.010;
 const CARRY_S: f64 = 1.0;
 const KEEP_S: f64 = 0.5;
 
-/// Way along the shaft by which open blades back out of tissue that presses them apart, at most (m),
-/// and their speed (m/s).
+/// Way along the shaft by which open blades back out of tissue that presses them apart, at most
+/// (m), and their speed (m/s).
 const BACK_OUT: f64 = 0.008;
 const BACK_OUT_SPEED: f64 = 0.010;
 

@@ -7,8 +7,8 @@ use crate::Episode;
 use crate::judge::{Context, Memory};
 use trocar_scene::{Condition, TaskName};
 
-/// Open blades go no deeper where tissue presses them apart with this share of the jaws' force: they
-/// could not close. From the smaller share on the force is watched every period.
+/// Open blades go no deeper where tissue presses them apart with this share of the jaws' force:
+/// they could not close. From the smaller share on the force is watched every period.
 const MAX_SPREAD: f64 = 0.8;
 pub(super) const WATCHED_SPREAD: f64 = 0.2;
 
@@ -117,8 +117,8 @@ impl Scripted {
         self.done > 0 && over
     }
 
-    /// While open blades go into tissue or back out: the force with which it presses them apart, over that of
-    /// the jaws; else 0.
+    /// While open blades go into tissue or back out: the force with which it presses them apart,
+    /// over that of the jaws; else 0.
     pub(super) fn spread(&self, episode: &Episode) -> f64 {
         if self.style != Style::Careful || !(self.goes_in() || self.phase == Phase::BackOut) {
             return 0.0;
@@ -142,7 +142,8 @@ impl Scripted {
         }
     }
 
-    /// Whether the jaws have stopped as good as open: their ends press on what lies below the tissue.
+    /// Whether the jaws have stopped as good as open: their ends press on what lies below the
+    /// tissue.
     fn is_kept_open(&self, episode: &Episode) -> bool {
         let (Some(k), Some(aim)) = (episode.roles().0, &self.grasp) else { return false };
         let open = episode.cell().observe()[k].measured.jaw() > KEPT_OPEN * aim.setpoint.jaw();
