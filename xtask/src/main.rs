@@ -3,6 +3,7 @@
 
 #![allow(clippy::print_stderr, reason = "this is a command-line program")]
 
+mod columns;
 mod figures;
 mod package;
 mod peers;
@@ -86,7 +87,8 @@ fn told(result: &Result<(), String>) -> bool {
 }
 
 fn test() -> ExitCode {
-    let of_rust = || TEST.iter().all(check) && EXAMPLES.iter().all(example) && docs();
+    eprintln!("\n== lines of prose");
+    let of_rust = || told(&columns::check()) && TEST.iter().all(check) && EXAMPLES.iter().all(example) && docs();
     if of_rust() && check_python(python::Build::Workspace) && check_viewer(viewer::Tests::Unit) {
         eprintln!("\nformatting, lints, tests, examples, docs, Python and the page are in order");
         return ExitCode::SUCCESS;

@@ -51,6 +51,11 @@ pub use trocar_cell as cell;
 pub use trocar_core as core;
 pub use trocar_geometry as geometry;
 #[cfg(feature = "reconstruct")]
+pub use trocar_identify as identify;
+pub use trocar_lattice as lattice;
+#[cfg(feature = "reconstruct")]
+pub use trocar_measure as measure;
+#[cfg(feature = "reconstruct")]
 pub use trocar_phantom as phantom;
 #[cfg(feature = "reconstruct")]
 pub use trocar_reconstruct as reconstruct;
@@ -69,6 +74,8 @@ pub use trocar_sensors as sensors;
 pub use trocar_specimen as specimen;
 pub use trocar_task as task;
 pub use trocar_tissue as tissue;
+#[cfg(feature = "view")]
+pub use trocar_view as view;
 #[cfg(feature = "reconstruct")]
 pub use trocar_workflow as workflow;
 
