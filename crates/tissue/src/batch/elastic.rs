@@ -211,6 +211,14 @@ where
 #[cold]
 #[inline(never)]
 fn add_limits<S: Simd>(simd: S, unit: &Material, weight: f32, f: &[Nine<S>; 9], p: &mut [Nine<S>; 9]) {
+    simd.vectorize(
+        #[inline(always)]
+        || add_limits_here(simd, unit, weight, f, p),
+    );
+}
+
+#[inline(always)]
+fn add_limits_here<S: Simd>(simd: S, unit: &Material, weight: f32, f: &[Nine<S>; 9], p: &mut [Nine<S>; 9]) {
     for (f, p) in f[..8].iter().zip(&mut p[..8]) {
         let mut square = splat(simd, 0.0);
         for e in 0..9 {

@@ -151,24 +151,27 @@ impl LowRankUpdate {
         let size = 3 * self.length;
         self.places.clear();
         for (node, _) in &self.nodes {
-            let place = self.known.iter().position(|known| known == node).unwrap_or_else(|| {
-                let unused = |known: &u32| self.nodes.iter().all(|(node, _)| node != known);
-                let free = if self.known.len() < MAX_NODES { None } else { self.known.iter().position(unused) };
-                let place = free.unwrap_or(self.known.len());
-                if place < self.known.len() {
-                    self.known[place] = *node;
-                } else {
-                    self.known.push(*node);
-                }
-                for c in 0..3 {
-                    scratch.fill(0.0);
-                    scratch[3 * *node as usize + c] = 1.0;
-                    factor.solve(simd, scratch);
-                    let column = &mut self.columns[place * size + c * self.length..][..self.length];
-                    column.copy_from_slice(&scratch[..self.length]);
-                }
-                place
-            });
+            // Solves in a closure that is not inlined would be compiled without the instruction set
+            // of `S`, and each of their operations would be a call.
+            if let Some(place) = self.known.iter().position(|known| known == node) {
+                self.places.push(place);
+                continue;
+            }
+            let unused = |known: &u32| self.nodes.iter().all(|(node, _)| node != known);
+            let free = if self.known.len() < MAX_NODES { None } else { self.known.iter().position(unused) };
+            let place = free.unwrap_or(self.known.len());
+            if place < self.known.len() {
+                self.known[place] = *node;
+            } else {
+                self.known.push(*node);
+            }
+            for c in 0..3 {
+                scratch.fill(0.0);
+                scratch[3 * *node as usize + c] = 1.0;
+                factor.solve(simd, scratch);
+                let column = &mut self.columns[place * size + c * self.length..][..self.length];
+                column.copy_from_slice(&scratch[..self.length]);
+            }
             self.places.push(place);
         }
     }
