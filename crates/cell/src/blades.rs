@@ -134,11 +134,16 @@ impl Blades {
 /// the outward force, as one rod that drives both would measure it. `forces` are those of all tools
 /// of the step, `tools` the indices of the gripper's; 0 without forces.
 pub fn opening_force(gripper: &Gripper, tools: Tools, forces: &[ToolForce]) -> f64 {
-    let of = |(tool, side): (usize, f64)| {
+    0.5 * blade_forces(gripper, tools, forces).iter().sum::<f64>()
+}
+
+/// Force with which tissue pushes each blade of `gripper` outwards (N), in the order of
+/// [`Tools::blades`]. Arguments are those of [`opening_force`].
+pub fn blade_forces(gripper: &Gripper, tools: Tools, forces: &[ToolForce]) -> [f64; 2] {
+    tools.sides().map(|(tool, side)| {
         let outwards = gripper.blade(side).rotation * (side * DVec3::Y);
         forces.get(tool).map_or(0.0, |f| f.contact.force.dot(outwards))
-    };
-    0.5 * tools.sides().map(of).iter().sum::<f64>()
+    })
 }
 
 #[cfg(test)]

@@ -295,8 +295,13 @@ fn waiting_actions_are_part_of_the_state_and_bad_ones_never_wait() {
 /// Brings open jaws to the tube and closes them by `jaws`, an opening a period: the force of the
 /// hold and that of the event (N), if anything is held.
 fn close_by(jaws: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    let mut cell = Cell::new(&ideal(false), &two_tubes(ONE_END, 2.2e-3), 1).unwrap();
-    let pose = over(&cell, "left", HELD, 0.0);
+    close_on(&two_tubes(ONE_END, 2.2e-3), HELD, jaws)
+}
+
+/// The same at a place of a specimen.
+fn close_on(specimen: &Specimen, at: DVec3, jaws: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let mut cell = Cell::new(&ideal(false), specimen, 1).unwrap();
+    let pose = over(&cell, "left", at, 0.0);
     let back = Pose { translation: pose.translation + 0.025 * DVec3::Z, ..pose };
     send(&mut cell, "left", &back, 1.0, 60);
     send(&mut cell, "left", &pose, 1.0, 30);
@@ -324,6 +329,18 @@ fn jaws_that_a_command_stops_hold_with_what_they_press() {
     assert_eq!(close_by(ramp).unwrap().0, 0.5);
     // Wide jaws that tissue hardly presses hold nothing.
     assert_eq!(close_by(std::iter::repeat_n(0.9, 30)), None);
+}
+
+#[test]
+fn jaws_hold_nothing_that_only_one_blade_presses() {
+    // Stiff tissue that stays where it is: beside its middle, one blade meets it and stops the
+    // jaws, while a part of it is loose between them.
+    let mut specimen = two_tubes(Pins::Band { share: 0.42 }, 2.2e-3);
+    specimen.organs[0].material.young_modulus_pa = 2e5;
+    let close = |aside: f64| close_on(&specimen, HELD + aside * DVec3::Y, std::iter::repeat_n(0.0, 30));
+    assert!(close(0.0).is_some_and(|(force, _)| force == 0.5));
+    assert_eq!(close(0.0035), None);
+    assert_eq!(close(-0.0035), None);
 }
 
 #[test]

@@ -19,7 +19,7 @@ const FORMAT: &str = "trocar-episode";
 /// Version 1 has no drawn values; the hashes of version 2 are of the text of an arm's state;
 /// version 3 is of contact of vertices alone, without instruments against solids; rules of version
 /// 4 switch contact off; the force guard of version 5 sees no torque.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 
 /// The first bytes of every episode file.
 const START: &[u8] = b"{\"format\":\"trocar-episode\"";

@@ -130,9 +130,9 @@ fn a_replay_draws_nothing() {
     // Files of earlier versions are refused in a line.
     let bytes = std::fs::read(&path).unwrap();
     let end = bytes.iter().position(|b| *b == b'\n').unwrap();
-    let header = String::from_utf8(bytes[..end].to_vec()).unwrap().replace("\"version\":7", "\"version\":6");
+    let header = String::from_utf8(bytes[..end].to_vec()).unwrap().replace("\"version\":8", "\"version\":7");
     let said = EpisodeFile::parse(&[header.as_bytes(), &bytes[end..]].concat()).unwrap_err();
-    assert!(said.contains("version 6; trocar-episode version 7 is read"), "{said}");
+    assert!(said.contains("version 7; trocar-episode version 8 is read"), "{said}");
 }
 
 /// The tube with what lifts tell about it.

@@ -6,7 +6,7 @@
 //! reach that share.
 
 /// Force on the blades (N) from which on they have met something.
-const TOUCH: f64 = 0.002;
+pub(super) const TOUCH: f64 = 0.002;
 
 /// Share of the opening at the first touch to which the jaws close at first.
 const SHARE: f64 = 0.36;
@@ -16,7 +16,7 @@ const SHARES: [f64; 2] = [0.2, 0.5];
 
 /// Smallest opening to which they close on what they have met: blades that are closer than the skin
 /// of either hold nothing.
-const LEAST_OPENING: f64 = 0.15;
+pub(super) const LEAST_OPENING: f64 = 0.15;
 
 /// A fold of wide tissue is pressed to this multiple of that share: jaws that close further on it
 /// push their tips through the surface beside it.

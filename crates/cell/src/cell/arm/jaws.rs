@@ -1,7 +1,7 @@
 //! Jaws of an arm: they grasp and release the tissue between them.
 
 use super::{ArmState, ArmUnit, Held};
-use crate::blades::{Tools, opening_force};
+use crate::blades::{Tools, blade_forces, opening_force};
 use crate::cell::report::CellEvent;
 use crate::grasp_candidate::{GraspCandidate, Snap};
 use crate::hold::{Hold, Moved};
@@ -19,6 +19,10 @@ const MIN_GRIP: f64 = 0.02;
 
 /// ... after they have stood there for this many tissue frames (0.1 s); jaws that move close on.
 const STANDING_FRAMES: u32 = 6;
+
+/// Each blade presses with at least this share of the jaws' force where they hold something. A
+/// blade that alone meets something stops the jaws, too; what lies between them is then loose.
+const BOTH_PRESS: f64 = 0.1;
 
 /// Openings that differ by less are the same.
 const SAME_OPENING: f64 = 1e-9;
@@ -75,11 +79,15 @@ impl ArmUnit {
     fn take_hold(&mut self, closing: f64, world: &mut World, events: &mut Vec<CellEvent>) {
         let (region, opening) = (self.jaw_region(), self.opening());
         let Self { model, state, .. } = self;
+        let on_blades = blade_forces(&state.gripper, Tools::of(0), &state.forces);
+        let closing_force_n = opening_force(&state.gripper, Tools::of(0), &state.forces);
+        if on_blades.into_iter().any(|force| force < BOTH_PRESS * closing_force_n) {
+            return;
+        }
         let Some((organ, tissue)) = region.fullest(world) else { return };
         let reach = reach_into(world, organ);
         let Some(candidate) = GraspCandidate::on(world, organ, &region, tissue, reach, state.design) else { return };
         let pose = state.gripper.pose;
-        let closing_force_n = opening_force(&state.gripper, Tools::of(0), &state.forces);
         let displaced_mm = 1e3 * candidate.displaced(world, organ);
         let forces = JawForces { closing, tearing: model.tear_force };
         let grasp = state.design.grasp(world, organ, &candidate.nodes, model.tools, &pose, forces);

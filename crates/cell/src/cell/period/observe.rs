@@ -1,6 +1,6 @@
 //! Stage 8: measurements at the end of the period.
 
-use crate::blades::{Tools, opening_force};
+use crate::blades::{Tools, blade_forces, opening_force};
 use crate::cell::Cell;
 use crate::cell::arm::ArmUnit;
 use crate::cell::report::{ArmObservation, CellEvent, CellReport, PeriodLog, TaggedForce};
@@ -54,6 +54,7 @@ impl ArmUnit {
             solid: state.solid.force(),
             solid_peak: state.solid.peak,
             jaw_force: self.opening_force(),
+            blade_forces: blade_forces(&state.gripper, Tools::of(0), &state.forces),
             load_limited: state.exchange.limited,
             attached: state.held.is_some(),
         }

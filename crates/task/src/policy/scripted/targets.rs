@@ -28,7 +28,8 @@ const KEEP_S: f64 = 0.5;
 const BACK_OUT: f64 = 0.008;
 const BACK_OUT_SPEED: f64 = 0.010;
 
-/// Way by which jaws that tissue keeps open back off (m), and its time (s).
+/// Way by which jaws that tissue keeps open back off (m), and its time (s). Where one blade alone
+/// presses on something, they go as far to the side of the other blade.
 const BACK_OFF: f64 = 0.0015;
 const BACK_OFF_S: f64 = 0.3;
 
@@ -131,8 +132,15 @@ impl Scripted {
                 self.time(episode, k, BACK_OUT_SPEED)?
             }
             Phase::BackOff => {
-                let (Some(k), Some(aim)) = (grasper, &self.grasp) else { return Ok(()) };
-                self.to[k] = cell.workspace(arms[k])?.behind(&self.from[k], BACK_OFF).with_jaw(aim.setpoint.jaw());
+                let (Some(k), Some(aim)) = (grasper, self.grasp) else { return Ok(()) };
+                let workspace = cell.workspace(arms[k])?;
+                let mut to = workspace.behind(&self.from[k], BACK_OFF);
+                if let Some(side) = self.lone_blade(episode) {
+                    let tip = workspace.tip(&to);
+                    let translation = tip.translation - side * BACK_OFF * (tip.rotation * DVec3::Y);
+                    to = cell.solve(arms[k], &Pose { translation, ..tip }, &to)?.setpoint;
+                }
+                self.to[k] = to.with_jaw(aim.setpoint.jaw());
                 BACK_OFF_S
             }
             Phase::Close => {

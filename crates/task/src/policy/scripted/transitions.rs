@@ -1,5 +1,6 @@
 //! Which phase of the script follows, and when a phase is over before its time.
 
+use super::super::grip::{LEAST_OPENING, TOUCH};
 use super::super::phase::Phase;
 use super::super::script::AfterHold;
 use super::{Scripted, Style, seen};
@@ -12,9 +13,13 @@ use trocar_scene::{Condition, TaskName};
 const MAX_SPREAD: f64 = 0.8;
 pub(super) const WATCHED_SPREAD: f64 = 0.2;
 
-/// Jaws that stop above this share of their opening have not closed. They back off so many times.
+/// Jaws that stop above this share of their opening have not closed. They back off so many times,
+/// and as often from what one blade alone presses on.
 const KEPT_OPEN: f64 = 0.85;
 const MAX_BACKS: usize = 4;
+
+/// A blade presses alone if it has this share of both blades' force.
+const ALONE: f64 = 0.9;
 
 /// The jaws lift until the tissue has risen by the gate's lift and this (m).
 const ENOUGH_ABOVE: f64 = 0.0005;
@@ -50,7 +55,7 @@ impl Scripted {
             Phase::Approach => Phase::Enter,
             Phase::Enter if self.spread(episode) >= MAX_SPREAD => Phase::BackOut,
             Phase::Enter | Phase::BackOut | Phase::BackOff => Phase::Close,
-            Phase::Close if self.is_kept_open(episode) => {
+            Phase::Close if self.backs < MAX_BACKS && self.does_not_close(episode) => {
                 self.backs += 1;
                 Phase::BackOff
             }
@@ -142,12 +147,23 @@ impl Scripted {
         }
     }
 
-    /// Whether the jaws have stopped as good as open: their ends press on what lies below the
-    /// tissue.
-    fn is_kept_open(&self, episode: &Episode) -> bool {
+    /// Whether the jaws have stopped as good as open, because their ends press on what lies below
+    /// the tissue, or one blade alone presses on what lies beside it.
+    fn does_not_close(&self, episode: &Episode) -> bool {
         let (Some(k), Some(aim)) = (episode.roles().0, &self.grasp) else { return false };
         let open = episode.cell().observe()[k].measured.jaw() > KEPT_OPEN * aim.setpoint.jaw();
-        self.style == Style::Careful && open && self.backs < MAX_BACKS
+        self.style == Style::Careful && (open || self.lone_blade(episode).is_some())
+    }
+
+    /// The side of the blade that alone keeps the jaws from closing, because it presses on something
+    /// beside the tissue: 1 for the one that opens towards +y of the tip, -1 for the other.
+    pub(super) fn lone_blade(&self, episode: &Episode) -> Option<f64> {
+        let arm = &episode.cell().observe()[episode.roles().0?];
+        let looks = self.style == Style::Careful && !arm.attached;
+        let alone = |force: f64| force > 2.0 * ALONE * arm.jaw_force;
+        let [plus, minus] = arm.blade_forces.map(alone);
+        let open = arm.measured.jaw() > LEAST_OPENING && arm.jaw_force > TOUCH;
+        (looks && open && (plus || minus)).then_some(if plus { 1.0 } else { -1.0 })
     }
 
     /// Whether the lift continues: the tissue has risen by `least` (mm), and not yet enough.
