@@ -5,6 +5,7 @@ use crate::Body;
 use crate::element::{Blocks, Wanted};
 use crate::flow::Flow;
 use crate::potential::{Potential, add_blocks};
+use fearless_simd::{Level, Simd, dispatch};
 use glam::{DMat3, DVec3};
 use trocar_sparse::BlockMatrix;
 
@@ -20,14 +21,19 @@ impl Body {
     ///
     /// All work is done on the calling thread.
     pub fn add_elastic(&self, x: &[DVec3], flow: &Flow, gradient: &mut [DVec3]) -> (f64, f64) {
+        dispatch!(Level::new(), simd => self.add_elastic_in(simd, x, flow, gradient))
+    }
+
+    #[inline(always)]
+    fn add_elastic_in<S: Simd>(&self, simd: S, x: &[DVec3], flow: &Flow, gradient: &mut [DVec3]) -> (f64, f64) {
         let (mut energy, mut least) = (0.0, f64::INFINITY);
         for (i, hex) in self.lattice().hexahedra().iter().enumerate() {
-            let before = flow.before.get(i).map(|before| (flow, before));
-            let (part, forces, ratio) = self.element(i).forces(&self.corners(i, x), before);
+            let before = if flow.before.is_empty() { None } else { Some((flow, &flow.before[i])) };
+            let (part, forces, ratio) = self.element(i).forces(simd, &self.corners(i, x), before);
             energy += part;
             least = least.min(ratio);
-            for (node, force) in hex.nodes.iter().zip(&forces) {
-                gradient[*node as usize] += *force;
+            for k in 0..8 {
+                gradient[hex.nodes[k] as usize] += forces[k];
             }
         }
         (energy, least)
@@ -82,8 +88,14 @@ impl Flow {
         self.stiffness = viscosity / h;
         self.before.clear();
         if viscosity > 0.0 {
-            let count = body.lattice().hexahedra().len();
-            self.before.extend((0..count).map(|hex| body.element(hex).green(&body.corners(hex, x))));
+            dispatch!(Level::new(), simd => self.begin_in(simd, body, x));
+        }
+    }
+
+    #[inline(always)]
+    fn begin_in<S: Simd>(&mut self, simd: S, body: &Body, x: &[DVec3]) {
+        for hex in 0..body.lattice().hexahedra().len() {
+            self.before.push(body.element(hex).green(simd, &body.corners(hex, x)));
         }
     }
 }

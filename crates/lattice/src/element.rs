@@ -11,7 +11,7 @@ use glam::{DMat3, DVec3};
 use trocar_geometry::symmetric::{Svd, nearest_rotation};
 
 /// Offset of Gauss's two points from the middle of a side, over the side.
-const GAUSS: f64 = 0.288_675_134_594_812_9;
+pub(crate) const GAUSS: f64 = 0.288_675_134_594_812_9;
 
 /// The lower triangle of an element's stiffness: block (a, b) with b <= a lies at a(a+1)/2 + b.
 pub(crate) type Blocks = [DMat3; 36];
@@ -101,40 +101,6 @@ impl Element<'_> {
         }
     }
 
-    /// Energy (J), its gradient by each node's position (N), the viscous part included if the
-    /// strains before are given, and the least ratio of volumes. The same as [`Self::evaluate`],
-    /// without singular values.
-    pub fn forces(&self, x: &[DVec3; 8], before: Option<(&Flow, &[DMat3; 8])>) -> (f64, [DVec3; 8], f64) {
-        let (mut energy, mut gradient, mut point, mut least) = (0.0, [DVec3::ZERO; 8], 0, f64::INFINITY);
-        self.for_points(|u, volume, part| {
-            let gradients = self.gradients(u);
-            let f = deformation(x, &gradients);
-            let (mut density, mut stress) = self.material.stress(part, f);
-            // The points of the fill come later. They have no viscosity, and may turn inside out.
-            if part == Part::Deviatoric && point < 8 {
-                if let Some((flow, before)) = before {
-                    let viscous = flow.stress(f, &before[point]);
-                    (density, stress) = (density + viscous.0, stress + viscous.1);
-                }
-                least = least.min(f.determinant());
-                point += 1;
-            }
-            energy += volume * density;
-            for (to, g) in gradient.iter_mut().zip(&gradients) {
-                *to += volume * (stress * *g);
-            }
-        });
-        (energy, gradient, least)
-    }
-
-    /// C = F'F at the points of the tissue's deviatoric part.
-    pub fn green(&self, x: &[DVec3; 8]) -> [DMat3; 8] {
-        CORNERS.map(|corner| {
-            let f = deformation(x, &self.gradients(self.hex.centre + self.hex.spread * corner));
-            f.transpose() * f
-        })
-    }
-
     /// The rotation of the cell's middle.
     pub fn rotation(&self, x: &[DVec3; 8]) -> DMat3 {
         nearest_rotation(deformation(x, &self.gradients(DVec3::splat(0.5))))
@@ -165,7 +131,7 @@ impl Element<'_> {
 }
 
 /// Corners of a cell about its middle.
-const CORNERS: [DVec3; 8] = [
+pub(crate) const CORNERS: [DVec3; 8] = [
     DVec3::new(-1.0, -1.0, -1.0),
     DVec3::new(1.0, -1.0, -1.0),
     DVec3::new(-1.0, 1.0, -1.0),

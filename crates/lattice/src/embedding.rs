@@ -20,11 +20,13 @@ pub struct EmbeddedPoint {
 impl EmbeddedPoint {
     /// The weighted sum of a vector field over the nodes: the point's position from their
     /// positions, its velocity from their velocities.
+    #[inline]
     pub fn interpolate(&self, field: &[DVec3]) -> DVec3 {
         self.nodes.iter().zip(&self.weights).map(|(node, weight)| *weight * field[*node as usize]).sum()
     }
 
     /// Adds a force at the point to the forces of the nodes.
+    #[inline]
     pub fn spread(&self, force: DVec3, forces: &mut [DVec3]) {
         for (node, weight) in self.nodes.iter().zip(&self.weights) {
             forces[*node as usize] += *weight * force;

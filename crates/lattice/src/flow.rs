@@ -1,5 +1,7 @@
 //! Viscosity over a step: what the strain since its beginning costs.
 
+use crate::points::{Lanes, Matrix, Symmetric, squared};
+use fearless_simd::{Simd, SimdBase};
 use glam::{DMat3, DVec3};
 
 /// The viscous part of a step of implicit Euler.
@@ -13,17 +15,36 @@ pub struct Flow {
     /// eta/h (Pa).
     pub(crate) stiffness: f64,
     /// C0 at the points of the deviatoric part, hexahedron by hexahedron.
-    pub(crate) before: Vec<[DMat3; 8]>,
+    pub(crate) before: Vec<Symmetric>,
 }
 
 impl Flow {
-    /// Stress F S with S = eta/h (2 E + tr(E) I), E = (C - C0)/2, and the energy density.
-    pub(crate) fn stress(&self, f: DMat3, before: &DMat3) -> (f64, DMat3) {
-        let strain = (f.transpose() * f - *before) * 0.5;
-        let trace = strain.x_axis.x + strain.y_axis.y + strain.z_axis.z;
-        let squares: f64 = strain.to_cols_array().iter().map(|e| e * e).sum();
-        let inner = (strain * 2.0 + DMat3::from_diagonal(DVec3::splat(trace))) * self.stiffness;
-        (self.stiffness * (squares + 0.5 * trace * trace), f * inner)
+    /// Adds the stress F S with S = eta/h (2 E + tr(E) I), E = (C - C0)/2, at the eight points;
+    /// returns the energy density.
+    #[inline(always)]
+    pub(crate) fn add_stress<S: Simd>(
+        &self,
+        simd: S,
+        f: &Matrix<Lanes<S>>,
+        before: &Symmetric,
+        stress: &mut Matrix<Lanes<S>>,
+    ) -> Lanes<S> {
+        let mut twice = squared(f);
+        for k in 0..6 {
+            twice[k] -= Lanes::<S>::from_slice(simd, &before[k]);
+        }
+        let [xx, yy, zz, xy, yz, zx] = twice;
+        let trace = (xx + yy + zz) * 0.5;
+        let inner = [[xx + trace, xy, zx], [xy, yy + trace, yz], [zx, yz, zz + trace]];
+        for column in 0..3 {
+            let by = &inner[column];
+            for row in 0..3 {
+                let push = f[0][row] * by[0] + f[1][row] * by[1] + f[2][row] * by[2];
+                stress[column][row] += push * self.stiffness;
+            }
+        }
+        let squares = (xx * xx + yy * yy + zz * zz + (xy * xy + yz * yz + zx * zx) * 2.0) * 0.25;
+        (squares + trace * trace * 0.5) * self.stiffness
     }
 
     /// Second derivative by two nodes with shape gradients `a` and `b`, without the part that turns

@@ -60,6 +60,7 @@ mod moments;
 mod newton;
 mod pcg;
 mod pieces;
+mod points;
 mod potential;
 mod ramify;
 

@@ -188,45 +188,6 @@ impl<T: Real> Cholesky<T> {
         }
     }
 
-    /// Solves A x = b in place, three numbers a node, nodes as the matrix numbers them.
-    pub fn solve(&self, x: &mut [T]) {
-        let mut y: Vec<T> =
-            self.order.iter().flat_map(|i| (0..3).map(move |c| 3 * *i as usize + c)).map(|i| x[i]).collect();
-        for panel in self.panels() {
-            for column in 0..panel.width() {
-                let value = y[panel.first() + column] / panel.at(column, column);
-                y[panel.first() + column] = value;
-                for row in column + 1..panel.width() {
-                    let to = &mut y[panel.first() + row];
-                    *to = *to - panel.at(row, column) * value;
-                }
-                for (k, row) in panel.rows().iter().enumerate() {
-                    for c in 0..3 {
-                        let to = &mut y[3 * *row as usize + c];
-                        *to = *to - panel.below(3 * k + c, column) * value;
-                    }
-                }
-            }
-        }
-        for panel in self.panels().rev() {
-            for column in (0..panel.width()).rev() {
-                let mut value = y[panel.first() + column];
-                for row in column + 1..panel.width() {
-                    value = value - panel.at(row, column) * y[panel.first() + row];
-                }
-                for (k, row) in panel.rows().iter().enumerate() {
-                    for c in 0..3 {
-                        value = value - panel.below(3 * k + c, column) * y[3 * *row as usize + c];
-                    }
-                }
-                y[panel.first() + column] = value / panel.at(column, column);
-            }
-        }
-        for (from, to) in self.order.iter().enumerate() {
-            x[3 * *to as usize..3 * *to as usize + 3].copy_from_slice(&y[3 * from..3 * from + 3]);
-        }
-    }
-
     /// The panels of the factor, in the order of elimination.
     pub fn panels(&self) -> impl DoubleEndedIterator<Item = Panel<'_, T>> {
         self.supernodes.iter().zip(self.first.windows(2)).map(|(supernode, range)| Panel {
@@ -258,6 +219,20 @@ impl<T: Real> Panel<'_, T> {
     /// The rows below its columns, as nodes in the order of elimination, ascending.
     pub fn rows(&self) -> &[u32] {
         &self.supernode.rows
+    }
+
+    /// Bands of its triangle, and of the rows below.
+    pub(crate) fn bands(&self) -> usize {
+        self.shape.bands
+    }
+
+    pub(crate) fn bands_below(&self) -> usize {
+        self.shape.bands_below
+    }
+
+    /// The numbers of a band, column by column. Those below follow those of the triangle.
+    pub(crate) fn band(&self, number: usize) -> &[T] {
+        &self.numbers[number * self.shape.band..(number + 1) * self.shape.band]
     }
 
     /// The number at `row` and `column` of its triangle.

@@ -11,6 +11,7 @@ mod dense;
 mod dissection;
 mod matrix;
 mod real;
+mod solve;
 mod supernodes;
 
 pub use cholesky::{Cholesky, Panel};

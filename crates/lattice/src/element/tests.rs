@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::flow::Flow;
-use crate::material::Law;
+use crate::material::{Law, Part};
+use crate::points::Symmetric;
+use fearless_simd::{Level, dispatch};
 use glam::DQuat;
 
 fn material(law: Law, poisson_ratio: f64) -> Material {
@@ -156,7 +158,9 @@ fn rotations_change_neither_energy_nor_forces() {
 #[test]
 fn both_ways_to_the_forces_agree() {
     elements(|element, x, name| {
-        let (energy, gradient, _) = element.forces(&x, None);
+        let (energy, gradient, least) = forces(element, &x, None);
+        assert_eq!(dispatch!(Level::baseline(), simd => element.forces(simd, &x, None)), (energy, gradient, least));
+        assert!((least - element.least_volume_ratio(&x)).abs() < 1e-12, "{name}: {least}");
         let with = element.evaluate(&x, Wanted::Gradient);
         let scale = element.material.bulk_modulus() * CELL.powi(3);
         assert!((energy - with.energy).abs() < 1e-12 * scale, "{name}: {energy} {}", with.energy);
@@ -171,10 +175,10 @@ fn both_ways_to_the_forces_agree() {
 #[test]
 fn viscous_forces_have_a_potential() {
     elements(|element, x, name| {
-        let flow = Flow { stiffness: 700.0, before: vec![element.green(&x)] };
+        let flow = Flow { stiffness: 700.0, before: vec![green(element, &x)] };
         let viscous = |x: &[DVec3; 8]| {
             let ((with, a, _), (without, b, _)) =
-                (element.forces(x, Some((&flow, &flow.before[0]))), element.forces(x, None));
+                (forces(element, x, Some((&flow, &flow.before[0]))), forces(element, x, None));
             (with - without, std::array::from_fn::<DVec3, 8, _>(|c| a[c] - b[c]))
         };
         let scale = flow.stiffness * CELL * CELL;
@@ -192,4 +196,12 @@ fn viscous_forces_have_a_potential() {
         let change: f64 = viscous(&at(1e-4)).1.iter().zip(&way).map(|(g, d)| g.dot(*d)).sum();
         assert!((change / 1e-4 / curvature - 1.0).abs() < 1e-3, "{name}: {change} {curvature}");
     });
+}
+
+fn forces(element: Element<'_>, x: &[DVec3; 8], before: Option<(&Flow, &Symmetric)>) -> (f64, [DVec3; 8], f64) {
+    dispatch!(Level::new(), simd => element.forces(simd, x, before))
+}
+
+fn green(element: Element<'_>, x: &[DVec3; 8]) -> Symmetric {
+    dispatch!(Level::new(), simd => element.green(simd, x))
 }

@@ -2,6 +2,7 @@
 
 use super::Principal;
 use glam::{DMat3, DVec3};
+use trocar_geometry::symmetric::nearest_rotation;
 
 /// mu (|S - I|^2 - tr(S - I)^2/3) = mu |dev S|^2.
 pub(super) fn deviatoric(mu: f64, s: DVec3) -> Principal {
@@ -29,6 +30,21 @@ pub(super) fn volumetric(bulk: f64, s: DVec3) -> Principal {
         shear: DVec3::ZERO,
         twist: pair_sums(first) / pair_sums(s),
     }
+}
+
+/// The rotation R of F, and tr(S - I).
+pub(super) fn stretch(f: DMat3) -> (DMat3, f64) {
+    let turn = nearest_rotation(f);
+    let off = f - turn;
+    (turn, (0..3).map(|c| turn.col(c).dot(off.col(c))).sum())
+}
+
+/// Energy density and stress of the deviatoric part at F.
+pub(super) fn shear(mu: f64, f: DMat3) -> (f64, DMat3) {
+    let (turn, trace) = stretch(f);
+    let off = f - turn;
+    let squares: f64 = off.to_cols_array().iter().map(|e| e * e).sum();
+    (mu * (squares - trace * trace / 3.0), (off - turn * (trace / 3.0)) * (2.0 * mu))
 }
 
 /// Sums of the two other coordinates.

@@ -17,10 +17,10 @@ use glam::{DMat3, DVec3};
 use trocar_geometry::symmetric::{cofactor, eigen};
 
 /// Square of the principal stretch above which stretch is limited.
-const MAX_FREE_STRETCH_SQUARED: f64 = 16.0;
+pub(super) const MAX_FREE_STRETCH_SQUARED: f64 = 16.0;
 
 /// Volume ratio below which the barrier acts, and below which it is a parabola.
-const BARRIER_BEGINS: f64 = 0.2;
+pub(super) const BARRIER_BEGINS: f64 = 0.2;
 const PARABOLA_BEGINS: f64 = 0.02;
 
 /// The limits of a material.

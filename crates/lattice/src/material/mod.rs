@@ -14,9 +14,11 @@ mod corotated;
 mod limits;
 mod stable_neo_hookean;
 
+use crate::points::{Lanes, Matrix, add_at_points, dot};
+use fearless_simd::{Simd, SimdBase, SimdMask};
 use glam::{DMat3, DVec3};
-use limits::Limits;
-use trocar_geometry::symmetric::{cofactor, eigen, nearest_rotation};
+use limits::{BARRIER_BEGINS, Limits, MAX_FREE_STRETCH_SQUARED};
+use trocar_geometry::symmetric::{cofactor, eigen};
 
 /// Constitutive law.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -90,44 +92,57 @@ impl Material {
         Ok(())
     }
 
-    /// Energy density and stress dPsi/dF (Pa) of a part at F, without singular values.
-    pub(crate) fn stress(&self, part: Part, f: DMat3) -> (f64, DMat3) {
-        let (energy, stress) = self.law_stress(part, f);
-        if part == Part::Volumetric {
-            return (energy, stress);
-        }
-        match self.limits().stress(f) {
-            None => (energy, stress),
-            Some((limit, push)) => (energy + limit, stress + push),
-        }
-    }
-
-    fn law_stress(&self, part: Part, f: DMat3) -> (f64, DMat3) {
-        let (mu, bulk) = (self.shear_modulus(), self.bulk_modulus());
+    /// Energy density and stress dPsi/dF (Pa) of the volumetric part at F, without singular values.
+    pub(crate) fn volumetric(&self, f: DMat3) -> (f64, DMat3) {
+        let bulk = self.bulk_modulus();
         match self.law {
             Law::Corotated => {
-                let turn = nearest_rotation(f);
-                let off = f - turn;
-                let trace: f64 = (0..3).map(|c| turn.col(c).dot(off.col(c))).sum();
-                if part == Part::Deviatoric {
-                    let squares: f64 = off.to_cols_array().iter().map(|e| e * e).sum();
-                    (mu * (squares - trace * trace / 3.0), (off - turn * (trace / 3.0)) * (2.0 * mu))
-                } else {
-                    (0.5 * bulk * trace * trace, turn * (bulk * trace))
-                }
+                let (turn, trace) = corotated::stretch(f);
+                (0.5 * bulk * trace * trace, turn * (bulk * trace))
             }
             Law::StableNeoHookean => {
                 let areas = cofactor(f);
                 let change = f.x_axis.dot(areas.x_axis) - 1.0;
-                if part == Part::Deviatoric {
-                    let squares: f64 = f.to_cols_array().iter().map(|e| e * e).sum();
-                    let energy = mu * (0.5 * (squares - 3.0) - change + change * change / 6.0);
-                    (energy, f * mu + areas * (mu * (change / 3.0 - 1.0)))
-                } else {
-                    (0.5 * bulk * change * change, areas * (bulk * change))
+                (0.5 * bulk * change * change, areas * (bulk * change))
+            }
+        }
+    }
+
+    /// Energy density and stress of the deviatoric part at the eight points of a cell, limits of
+    /// strain included, at F with the cofactor `areas` and the determinant `ratio`.
+    #[inline(always)]
+    pub(crate) fn deviatoric<S: Simd>(
+        &self,
+        simd: S,
+        f: &Matrix<Lanes<S>>,
+        areas: &Matrix<Lanes<S>>,
+        ratio: Lanes<S>,
+    ) -> (Lanes<S>, Matrix<Lanes<S>>) {
+        let zero = Lanes::<S>::splat(simd, 0.0);
+        let (mut density, mut stress) = (zero, [[zero; 3]; 3]);
+        let squares = dot(&f[0], &f[0]) + dot(&f[1], &f[1]) + dot(&f[2], &f[2]);
+        match self.law {
+            Law::Corotated => {
+                let mu = self.shear_modulus();
+                add_at_points(simd, f, (&mut density, &mut stress), |f| Some(corotated::shear(mu, f)));
+            }
+            Law::StableNeoHookean => {
+                let (mu, change) = (self.shear_modulus(), ratio - 1.0);
+                density = ((squares - 3.0) * 0.5 - change + change * change * (1.0 / 6.0)) * mu;
+                let by = (change * (1.0 / 3.0) - 1.0) * mu;
+                for column in 0..3 {
+                    for row in 0..3 {
+                        stress[column][row] = f[column][row] * mu + areas[column][row] * by;
+                    }
                 }
             }
         }
+        let limited = squares.simd_gt(Lanes::<S>::splat(simd, MAX_FREE_STRETCH_SQUARED))
+            | ratio.simd_lt(Lanes::<S>::splat(simd, BARRIER_BEGINS));
+        if limited.any_true() {
+            add_at_points(simd, f, (&mut density, &mut stress), |f| self.limits().stress(f));
+        }
+        (density, stress)
     }
 
     /// The energy density of a part at the singular values `s` of F, with its derivatives.

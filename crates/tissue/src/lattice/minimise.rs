@@ -39,7 +39,7 @@ const EARTH: f64 = 9.81;
 /// Rounding of the energy, over the energy.
 const ROUNDING: f64 = 1e-12;
 
-/// A step and the change of the gradient along it.
+/// A step and the change of the gradient along it. Bodies without any have an empty list.
 struct Pair {
     step: Vec<Vec<DVec3>>,
     change: Vec<Vec<DVec3>>,
@@ -70,6 +70,8 @@ struct Value {
     gradient: Vec<Vec<DVec3>>,
     /// Without the terms, by body.
     elastic: Vec<Elastic>,
+    /// Where the points of the terms are (m).
+    points: Vec<DVec3>,
 }
 
 /// When a search ends.
@@ -85,9 +87,10 @@ impl Island<'_> {
     /// Moves the lattices to the minimum of the potential.
     pub fn minimise(&mut self) -> Outcome {
         let first = self.first_elastic();
-        self.update_limits();
+        let points = self.points(&self.x);
+        self.update_limits(&points);
         let start = self.x.clone();
-        let mut value = self.with_terms(&self.x, first);
+        let mut value = self.with_terms(points, first);
         let mut pairs: Vec<Pair> = Vec::new();
         let (mut outcome, mut of_factor, mut projected) = (Outcome::default(), 0, false);
         loop {
@@ -127,12 +130,12 @@ impl Island<'_> {
                 if pairs.len() == MEMORY {
                     pairs.remove(0);
                 }
-                pairs.push(Pair { step, change, inverse: 1.0 / curvature });
+                pairs.push(Pair { step: moved(step), change: moved(change), inverse: 1.0 / curvature });
             }
             self.x = x;
             outcome.steps += 1;
             of_factor += 1;
-            value = if self.update_limits() { self.with_terms(&self.x, next.elastic) } else { next };
+            value = if self.update_limits(&next.points) { self.with_terms(next.points, next.elastic) } else { next };
             let way = longest(&difference(&self.x, &start));
             if share == 1.0 && reached <= self.precision.tolerance.max(self.precision.relative * way) {
                 outcome.converged = true;
@@ -161,13 +164,19 @@ impl Island<'_> {
         first.collect()
     }
 
-    /// Sets the limits of friction to those of the present positions. Returns whether any changed.
-    fn update_limits(&mut self) -> bool {
-        let x: Vec<&[DVec3]> = self.x.iter().map(|x| &x[..]).collect();
+    /// Where the points of the terms are with the nodes at `x` (m).
+    fn points(&self, x: &[Vec<DVec3>]) -> Vec<DVec3> {
+        let x: Vec<&[DVec3]> = x.iter().map(|x| &x[..]).collect();
+        self.terms.iter().map(|term| term.at(&x)).collect()
+    }
+
+    /// Sets the limits of friction to those with the points of the terms at `points`. Returns
+    /// whether any changed.
+    fn update_limits(&mut self, points: &[DVec3]) -> bool {
         let mut changed = false;
-        for term in &mut self.terms {
+        for (term, point) in self.terms.iter_mut().zip(points) {
             let before = term.limit;
-            term.update_limit(&x);
+            term.update_limit(*point);
             changed |= term.limit != before;
         }
         changed
@@ -179,20 +188,21 @@ impl Island<'_> {
             let moves = direction[lattice.member].iter().any(|d| *d != DVec3::ZERO);
             if moves { lattice.elastic(&x[lattice.member]) } else { before.clone() }
         });
-        self.with_terms(x, elastic.collect())
+        self.with_terms(self.points(x), elastic.collect())
     }
 
-    /// Adds the terms at `x` to the elastic part.
-    fn with_terms(&self, x: &[Vec<DVec3>], elastic: Vec<Elastic>) -> Value {
-        let mut gradient: Vec<Vec<DVec3>> = vec![Vec::new(); x.len()];
+    /// Adds the terms with their points at `points` to the elastic part.
+    fn with_terms(&self, points: Vec<DVec3>, elastic: Vec<Elastic>) -> Value {
+        let mut gradient: Vec<Vec<DVec3>> = vec![Vec::new(); self.x.len()];
         let mut energy = 0.0;
         for (lattice, elastic) in self.lattices.iter().zip(&elastic) {
             gradient[lattice.member].clone_from(&elastic.gradient);
             energy += elastic.energy;
         }
-        let x: Vec<&[DVec3]> = x.iter().map(|x| &x[..]).collect();
-        energy += self.terms.iter().map(|term| term.add_gradient(&x, &mut gradient)).sum::<f64>();
-        Value { energy, gradient, elastic }
+        for (term, point) in self.terms.iter().zip(&points) {
+            energy += term.add_gradient(*point, &mut gradient);
+        }
+        Value { energy, gradient, elastic, points }
     }
 
     /// Whether the forces of every body are in balance.
@@ -258,17 +268,33 @@ fn balanced(lattice: &Lattice<'_>, gradient: &[DVec3]) -> bool {
     gradient.iter().map(|g| g.length_squared()).sum::<f64>() <= tolerance * tolerance
 }
 
+/// The lists without those that are zero: most bodies of an island lie still.
+fn moved(mut lists: Vec<Vec<DVec3>>) -> Vec<Vec<DVec3>> {
+    for list in &mut lists {
+        if list.iter().all(|v| *v == DVec3::ZERO) {
+            list.clear();
+        }
+    }
+    lists
+}
+
 /// Length of the longest vector.
 fn longest(vectors: &[Vec<DVec3>]) -> f64 {
     vectors.iter().flatten().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt()
 }
 
 fn dot(a: &[Vec<DVec3>], b: &[Vec<DVec3>]) -> f64 {
-    a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a.dot(*b)).sum()
+    let mut sum = DVec3::ZERO;
+    for (a, b) in a.iter().zip(b) {
+        a.iter().zip(b).for_each(|(a, b)| sum += *a * *b);
+    }
+    sum.element_sum()
 }
 
 fn add(to: &mut [Vec<DVec3>], by: f64, what: &[Vec<DVec3>]) {
-    to.iter_mut().flatten().zip(what.iter().flatten()).for_each(|(to, what)| *to += by * *what);
+    for (to, what) in to.iter_mut().zip(what) {
+        to.iter_mut().zip(what).for_each(|(to, what)| *to += by * *what);
+    }
 }
 
 fn scaled(vectors: &[Vec<DVec3>], by: f64) -> Vec<Vec<DVec3>> {

@@ -49,6 +49,27 @@ pub(super) struct Term {
     pub limit: f64,
 }
 
+/// What a term exerts.
+struct Value {
+    /// (J).
+    energy: f64,
+    /// Gradient by the point (N).
+    force: DVec3,
+    normal: DVec3,
+    /// Stiffness along the normal and across it (N/m).
+    along: f64,
+    across: f64,
+}
+
+impl Value {
+    /// Second derivative by the point (N/m), positive semidefinite.
+    fn stiffness(&self) -> DMat3 {
+        let n = self.normal;
+        let outer = DMat3::from_cols(n * n.x, n * n.y, n * n.z);
+        outer * (self.along - self.across) + DMat3::from_diagonal(DVec3::splat(self.across))
+    }
+}
+
 impl Term {
     /// A spring of `stiffness` (N/m) from a point to a place (m).
     pub fn spring(share: Share, place: DVec3, stiffness: f64) -> Self {
@@ -74,7 +95,7 @@ impl Term {
     }
 
     /// The point, with the lattices' nodes at `x` (m).
-    fn at(&self, x: &[&[DVec3]]) -> DVec3 {
+    pub fn at(&self, x: &[&[DVec3]]) -> DVec3 {
         let of = |share: &Share| match &share.place {
             Place::Embedded(point) => share.share * point.interpolate(x[share.member]),
             Place::Fixed(place) => share.share * *place,
@@ -99,46 +120,38 @@ impl Term {
         [force, energy, if beyond > 0.0 { hard } else { k }]
     }
 
-    /// Sets the limit of friction to that at `x`.
-    pub fn update_limit(&mut self, x: &[&[DVec3]]) {
+    /// Sets the limit of friction to that with the point at `p` (m).
+    pub fn update_limit(&mut self, p: DVec3) {
         let Law::Contact { normal, point, friction, .. } = self.law else { return };
         self.limit = match friction {
             Friction::Coulomb(0.0) => 0.0,
-            Friction::Coulomb(coefficient) => -f64::from(coefficient) * self.press((self.at(x) - point).dot(normal))[0],
+            Friction::Coulomb(coefficient) => -f64::from(coefficient) * self.press((p - point).dot(normal))[0],
             Friction::Clamped(force) => f64::from(force.max(0.0)),
         };
     }
 
-    /// Energy at `x` (J), its gradient by the point (N) and, positive semidefinite, its second
-    /// derivative (N/m). None where nothing acts.
-    fn value(&self, x: &[&[DVec3]]) -> Option<(f64, DVec3, DMat3)> {
-        let p = self.at(x);
+    /// What acts with the point at `p` (m), if anything does.
+    fn value(&self, p: DVec3) -> Option<Value> {
+        let (k, off) = (self.stiffness, p - self.place);
         let Law::Contact { normal, point, .. } = self.law else {
-            let off = p - self.place;
-            let k = self.stiffness;
-            return Some((0.5 * k * off.length_squared(), k * off, DMat3::from_diagonal(DVec3::splat(k))));
+            let energy = 0.5 * k * off.length_squared();
+            return Some(Value { energy, force: k * off, normal: DVec3::ZERO, along: k, across: k });
         };
         let [force, mut energy, along] = self.press((p - point).dot(normal));
         if along == 0.0 && self.limit <= 0.0 {
             return None;
         }
-        let off = p - self.place;
         let off = off - off.dot(normal) * normal;
-        let pull = self.stiffness * off.length();
-        let across = self.stiffness * if pull > self.limit { self.limit / pull } else { 1.0 };
-        energy += if pull > self.limit {
-            self.limit * (off.length() - 0.5 * self.limit / self.stiffness)
-        } else {
-            0.5 * self.stiffness * off.length_squared()
-        };
-        let outer = DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z);
-        let block = outer * (along - across) + DMat3::from_diagonal(DVec3::splat(across));
-        Some((energy, force * normal + across * off, block))
+        let length = off.length();
+        let slides = k * length > self.limit;
+        let across = if slides { self.limit / length } else { k };
+        energy += if slides { self.limit * (length - 0.5 * self.limit / k) } else { 0.5 * k * length * length };
+        Some(Value { energy, force: force * normal + across * off, normal, along, across })
     }
 
-    /// Adds the gradient at `x` (N); returns the energy (J).
-    pub fn add_gradient(&self, x: &[&[DVec3]], gradient: &mut [Vec<DVec3>]) -> f64 {
-        let Some((energy, force, _)) = self.value(x) else { return 0.0 };
+    /// Adds the gradient with the point at `p` (N); returns the energy (J).
+    pub fn add_gradient(&self, p: DVec3, gradient: &mut [Vec<DVec3>]) -> f64 {
+        let Some(Value { energy, force, .. }) = self.value(p) else { return 0.0 };
         for share in self.shares() {
             if let Place::Embedded(point) = &share.place {
                 point.spread(share.share * force, &mut gradient[share.member]);
@@ -154,7 +167,8 @@ impl Term {
         if !self.shares().any(|share| share.member == member) {
             return;
         }
-        let Some((_, _, block)) = self.value(x) else { return };
+        let Some(value) = self.value(self.at(x)) else { return };
+        let block = value.stiffness();
         for share in self.shares().filter(|share| share.member == member) {
             if let Place::Embedded(point) = &share.place {
                 for (a, wa) in point.nodes.iter().zip(&point.weights) {
