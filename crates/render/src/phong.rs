@@ -5,6 +5,7 @@
 //! so it must not change. The cameras of a running simulation use [`crate::Stage`], which is faster
 //! and follows deforming shapes.
 
+mod drawn;
 mod scene;
 mod shade;
 mod trace;

@@ -1,6 +1,7 @@
 //! Scenes of the simple renderer and their images.
 
 use super::shade::{Lit, shade};
+use super::drawn::{Hits, Row};
 use super::trace::{Hit, Tracer};
 use crate::srgb;
 use glam::DVec3;
@@ -87,15 +88,15 @@ pub fn label_mask(frame: &PhongImage, label: u16) -> Mask {
 }
 
 /// A camera at its pose.
-struct View<'a> {
-    camera: &'a Camera,
-    pose: &'a Pose,
+pub(super) struct View<'a> {
+    pub camera: &'a Camera,
+    pub pose: &'a Pose,
 }
 
 impl View<'_> {
     /// World direction through a pixel, with z = 1 in the camera frame: the ray parameter of a hit
     /// is its depth.
-    fn direction(&self, u: f64, v: f64) -> DVec3 {
+    pub fn direction(&self, u: f64, v: f64) -> DVec3 {
         self.pose.rotation * self.camera.ray(u, v)
     }
 }
@@ -182,44 +183,39 @@ impl PhongScene {
         if width == 0 {
             return frame;
         }
+        let middles = Hits::new(&self.tracer, &view, 1);
+        let within = (samples > 1).then(|| Hits::new(&self.tracer, &view, samples));
         let rows = frame.color.pixels.par_chunks_mut(width).zip(frame.depth.depth.par_chunks_mut(width));
         let rows = rows.zip(frame.labels.par_chunks_mut(width)).zip(frame.facing.par_chunks_mut(width));
-        rows.enumerate().for_each(|(v, (((color, depth), labels), facing))| {
+        rows.enumerate().for_each_init(Row::default, |row, (v, (((color, depth), labels), facing))| {
+            middles.row(v, row);
             for u in 0..width {
-                let direction = view.direction(u as f64, v as f64);
-                let centre = self.tracer.first(pose.translation, direction, f64::INFINITY);
-                if let Some(hit) = &centre {
-                    let (instance, _) = self.triangles[hit.triangle as usize];
-                    depth[u] = hit.t as f32;
-                    labels[u] = self.looks[instance as usize].0;
-                    facing[u] = self.flat_normal(hit).dot(direction.normalize()).abs() as f32;
+                let (direction, Some(hit)) = (row.directions[u], &row.hits[u]) else { continue };
+                let (instance, _) = self.triangles[hit.triangle as usize];
+                depth[u] = hit.t as f32;
+                labels[u] = self.looks[instance as usize].0;
+                facing[u] = self.flat_normal(hit).dot(direction.normalize()).abs() as f32;
+            }
+            let Some(within) = &within else {
+                for (color, (direction, hit)) in color.iter_mut().zip(row.directions.iter().zip(&row.hits)) {
+                    *color = srgb::from_linear(self.light_of(&view, *direction, *hit));
                 }
-                color[u] = if samples == 1 {
-                    srgb::from_linear(self.light_of(&view, direction, centre))
-                } else {
-                    self.averaged(&view, u, v, samples)
-                };
+                return;
+            };
+            let mut sums = vec![[0.0; 3]; width];
+            for j in 0..samples {
+                within.row(v * samples + j, row);
+                for (k, (direction, hit)) in row.directions.iter().zip(&row.hits).enumerate() {
+                    let light = self.light_of(&view, *direction, *hit);
+                    // Clip before averaging; otherwise the edge of a highlight stays jagged.
+                    (0..3).for_each(|c| sums[k / samples][c] += light[c].min(1.0));
+                }
+            }
+            for (color, sum) in color.iter_mut().zip(sums) {
+                *color = srgb::from_linear(sum.map(|s| s / (samples * samples) as f32));
             }
         });
         frame
-    }
-
-    /// Colour of a pixel from a regular grid of rays.
-    fn averaged(&self, view: &View<'_>, u: usize, v: usize, samples: usize) -> [u8; 3] {
-        let offset = |i: usize| (i as f64 + 0.5) / samples as f64 - 0.5;
-        let mut sum = [0.0; 3];
-        for j in 0..samples {
-            for i in 0..samples {
-                let direction = view.direction(u as f64 + offset(i), v as f64 + offset(j));
-                let hit = self.tracer.first(view.pose.translation, direction, f64::INFINITY);
-                let light = self.light_of(view, direction, hit);
-                for k in 0..3 {
-                    // Clip before averaging; otherwise the edge of a highlight stays jagged.
-                    sum[k] += light[k].min(1.0);
-                }
-            }
-        }
-        srgb::from_linear(sum.map(|s| s / (samples * samples) as f32))
     }
 
     /// Unit normal of the triangle that was hit.

@@ -80,6 +80,16 @@ impl Tracer {
         Self { bvh, corners, centre, radius }
     }
 
+    /// The triangles, in an order of its own: first corner and the two edges from it (m).
+    pub fn corners(&self) -> &[[DVec3; 3]] {
+        &self.corners
+    }
+
+    /// The number that triangle `own` of [`Self::corners`] had in [`Self::new`].
+    pub fn given(&self, own: u32) -> u32 {
+        self.bvh.primitive_indices[own as usize]
+    }
+
     /// First hit with `t` in (0, `reach`]. `direction` need not be of unit length.
     pub fn first(&self, origin: DVec3, direction: DVec3, reach: f64) -> Option<Hit> {
         let mut best: Option<Hit> = None;
@@ -137,7 +147,7 @@ impl Tracer {
 }
 
 /// Two-sided intersection in double precision (Moeller and Trumbore 1997).
-fn intersect([a, ab, ac]: &[DVec3; 3], origin: DVec3, direction: DVec3) -> Option<(f64, f64, f64)> {
+pub(super) fn intersect([a, ab, ac]: &[DVec3; 3], origin: DVec3, direction: DVec3) -> Option<(f64, f64, f64)> {
     let p = direction.cross(*ac);
     let det = ab.dot(p);
     if det == 0.0 {
