@@ -29,18 +29,27 @@ pub fn img(picture: &ColorImage, alt: &str) -> Result<String> {
         rgb
     };
     let (width, height) = rgb.dimensions();
-    let mut png = Vec::new();
-    PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::Adaptive).write_image(
-        &rgb,
-        width,
-        height,
-        ExtendedColorType::Rgb8,
-    )?;
     let mut jpeg = Vec::new();
     JpegEncoder::new_with_quality(&mut jpeg, JPEG_QUALITY).write_image(&rgb, width, height, ExtendedColorType::Rgb8)?;
-    let (kind, bytes) =
-        if 2 * png.len() <= 3 * jpeg.len() || png.len() < 40_000 { ("png", png) } else { ("jpeg", jpeg) };
+    let (kind, bytes) = small_png(&rgb, jpeg.len())?.map_or(("jpeg", jpeg), |png| ("png", png));
     Ok(img_of_bytes(kind, &bytes, width as usize, height as usize, alt))
+}
+
+/// The picture as PNG, if that is no larger than 40 kB or one and a half times its JPEG of `jpeg`
+/// bytes.
+fn small_png(rgb: &RgbImage, jpeg: usize) -> Result<Option<Vec<u8>>> {
+    let encode = |compression| -> Result<Vec<u8>> {
+        let mut png = Vec::new();
+        let encoder = PngEncoder::new_with_quality(&mut png, compression, FilterType::Adaptive);
+        encoder.write_image(rgb, rgb.width(), rgb.height(), ExtendedColorType::Rgb8)?;
+        Ok(png)
+    };
+    let is_small = |png: &Vec<u8>, times: usize| png.len() < 40_000 * times || 2 * png.len() <= 3 * jpeg * times;
+    // Good compression takes most of the time, and does not halve what the fast one leaves.
+    if !is_small(&encode(CompressionType::Fast)?, 2) {
+        return Ok(None);
+    }
+    Ok(Some(encode(CompressionType::Default)?).filter(|png| is_small(png, 1)))
 }
 
 /// A picture above its caption (HTML), as a `<figure>`; `alt` is plain text.
