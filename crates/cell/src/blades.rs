@@ -206,6 +206,8 @@ mod tests {
         };
         let forces = [ToolForce::default(), push(1.0, 2.0), push(-1.0, 1.0)];
         assert!((opening_force(&gripper, Tools::of(0), &forces) - 1.5).abs() < 1e-12);
+        let [plus, minus] = blade_forces(&gripper, Tools::of(0), &forces);
+        assert!((plus - 2.0).abs() < 1e-12 && (minus - 1.0).abs() < 1e-12);
         assert_eq!(opening_force(&gripper, Tools::of(0), &[]), 0.0);
     }
 }

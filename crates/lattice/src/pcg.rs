@@ -35,7 +35,7 @@ impl Preconditioner {
         for (numbers, p) in self.numbers.chunks_exact_mut(3).zip(from) {
             p.write_to_slice(numbers);
         }
-        self.cholesky.solve(&mut self.numbers);
+        self.cholesky.solve(Level::new(), &mut self.numbers);
         for (numbers, p) in self.numbers.chunks_exact(3).zip(to) {
             *p = DVec3::from_slice(numbers);
         }

@@ -17,10 +17,10 @@ use std::ops::{Add, Mul, Sub};
 pub(crate) type Lanes<S> = f64x8<S>;
 
 /// The same in memory.
-pub(crate) type Points = [f64; 8];
+pub(crate) type PointValues = [f64; 8];
 
 /// A symmetric matrix at the eight points: xx, yy, zz, xy, yz, zx.
-pub(crate) type Symmetric = [Points; 6];
+pub(crate) type Symmetric = [PointValues; 6];
 
 /// A number, or one at each of the eight points.
 pub(crate) trait Number:
@@ -50,7 +50,7 @@ const EDGES: [[[usize; 2]; 4]; 3] =
 const OTHERS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
 
 /// Signs of the corners along an axis, in the order of the lanes.
-const SIGNS: [Points; 3] = [
+const SIGNS: [PointValues; 3] = [
     [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0],
     [-1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0],
     [-1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0, 1.0],
@@ -135,7 +135,7 @@ impl Element<'_> {
         let ratio = dot(&f[0], &areas[0]);
         let (mut density, mut stress) = self.material.deviatoric(simd, &f, &areas, ratio);
         if let Some((flow, before)) = before {
-            density = density + flow.add_stress(simd, &f, before, &mut stress);
+            density += flow.add_stress(simd, &f, before, &mut stress);
         }
         let volume = rule.volume / 8.0;
         for axis in 0..3 {
@@ -225,11 +225,13 @@ fn cofactor<T: Number>(f: &Matrix<T>) -> Matrix<T> {
     [cross(&f[1], &f[2]), cross(&f[2], &f[0]), cross(&f[0], &f[1])]
 }
 
+/// The cross product.
 #[inline(always)]
 fn cross<T: Number>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+/// The product of two vectors.
 #[inline(always)]
 pub(crate) fn dot<T: Number>(a: &[T; 3], b: &[T; 3]) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -262,8 +264,9 @@ fn least<S: Simd>(lanes: Lanes<S>) -> f64 {
     least
 }
 
-/// Adds to the energy density and the stress at each point what `of` says for its F. Not for every
-/// step: each point by itself.
+/// Adds to the energy density and the stress at each point what `of` says for its F. Points are
+/// computed one after the other.
+#[inline(always)]
 pub(crate) fn add_at_points<S: Simd>(
     simd: S,
     f: &Matrix<Lanes<S>>,
@@ -284,8 +287,8 @@ pub(crate) fn add_at_points<S: Simd>(
             }
         }
     }
-    *density = *density + Lanes::<S>::from_slice(simd, &energies);
+    *density += Lanes::<S>::from_slice(simd, &energies);
     for k in 0..9 {
-        stress[k / 3][k % 3] = stress[k / 3][k % 3] + Lanes::<S>::from_slice(simd, &pushes[k]);
+        stress[k / 3][k % 3] += Lanes::<S>::from_slice(simd, &pushes[k]);
     }
 }

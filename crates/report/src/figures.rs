@@ -45,8 +45,8 @@ fn small_png(rgb: &RgbImage, jpeg: usize) -> Result<Option<Vec<u8>>> {
         Ok(png)
     };
     let is_small = |png: &Vec<u8>, times: usize| png.len() < 40_000 * times || 2 * png.len() <= 3 * jpeg * times;
-    // Good compression takes most of the time, and does not halve what the fast one leaves.
-    if !is_small(&encode(CompressionType::Fast)?, 2) {
+    // Good compression takes most of the time. It hardly halves what the lightest one leaves.
+    if !is_small(&encode(CompressionType::Level(1))?, 2) {
         return Ok(None);
     }
     Ok(Some(encode(CompressionType::Default)?).filter(|png| is_small(png, 1)))

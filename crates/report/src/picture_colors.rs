@@ -1,5 +1,6 @@
 //! Conversions of pictures: averages, and colours of labels and depth.
 
+use crate::colors::{self, SEQUENTIAL};
 use trocar_camera::ColorImage;
 
 /// The picture reduced by the factor `finer`, by averaging.
@@ -45,15 +46,6 @@ pub fn shown(depth: &trocar_camera::DepthImage) -> ColorImage {
     valid.sort_by(f32::total_cmp);
     let at = |share: f64| valid.get((share * valid.len().saturating_sub(1) as f64) as usize).copied().unwrap_or(1.0);
     let (near, far) = (at(0.01), at(0.97));
-    // Samples of the colour map Viridis.
-    let stops: [[f64; 3]; 6] = [
-        [253.0, 231.0, 37.0],
-        [122.0, 209.0, 81.0],
-        [34.0, 168.0, 132.0],
-        [42.0, 120.0, 142.0],
-        [65.0, 68.0, 135.0],
-        [68.0, 1.0, 84.0],
-    ];
     let color = |d: &f32| {
         if *d <= 0.0 {
             return [0; 3];
@@ -61,9 +53,7 @@ pub fn shown(depth: &trocar_camera::DepthImage) -> ColorImage {
         // Half by depth and half by rank, so that a flat object on a table is not all one colour.
         let rank = valid.partition_point(|v| *v < whole(*d)) as f64 / valid.len().max(1) as f64;
         let share = f64::from((d - near) / (far - near).max(1e-6));
-        let x = 5.0 * (0.5 * share.clamp(0.0, 1.0) + 0.5 * rank).min(0.9999);
-        let (i, t) = (x as usize, x.fract());
-        [0, 1, 2].map(|k| (stops[i][k] + t * (stops[i + 1][k] - stops[i][k])) as u8)
+        colors::map(&SEQUENTIAL, 1.0 - 0.5 * (share.clamp(0.0, 1.0) + rank))
     };
     ColorImage { width: depth.width, height: depth.height, pixels: depth.depth.iter().map(color).collect() }
 }

@@ -58,5 +58,5 @@ fn solve(bencher: Bencher<'_, '_>) {
     let mut factor = Cholesky::new(&matrix, &positions);
     factorise(&matrix, &mut factor);
     let mut x = vec![1.0; 3 * positions.len()];
-    bencher.bench_local(|| factor.solve(&mut x));
+    bencher.bench_local(|| factor.solve(Level::new(), &mut x));
 }

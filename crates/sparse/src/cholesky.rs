@@ -27,7 +27,7 @@ const SHARED: u64 = 1 << 20;
 /// let mut factor = Cholesky::<f64>::new(&matrix, &[DVec3::ZERO, DVec3::X]);
 /// assert!(factor.factorise(Level::new(), matrix.blocks().map(|(_, _, block)| block.to_cols_array_2d())));
 /// let mut x = [3.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-/// factor.solve(&mut x);
+/// factor.solve(Level::new(), &mut x);
 /// assert!((x[0] - 2.0).abs() < 1e-12 && (x[3] - 1.0).abs() < 1e-12);
 /// ```
 pub struct Cholesky<T> {

@@ -9,13 +9,14 @@ use fearless_simd::{Level, Simd, SimdBase, dispatch};
 type Sums<T, S> = [<T as Real>::Vector<S>; COLUMNS];
 
 impl<T: Real> Cholesky<T> {
-    /// Solves A x = b in place, three numbers a node, nodes as the matrix numbers them.
-    pub fn solve(&self, x: &mut [T]) {
+    /// Solves A x = b in place, three numbers a node, nodes as the matrix numbers them, with vectors
+    /// of `level`. The bits do not depend on it.
+    pub fn solve(&self, level: Level, x: &mut [T]) {
         let mut y: Vec<T> = Vec::with_capacity(x.len());
         for i in self.order() {
             y.extend_from_slice(&x[3 * *i as usize..3 * *i as usize + 3]);
         }
-        dispatch!(Level::new(), simd => self.substitute(simd, &mut y));
+        dispatch!(level, simd => self.substitute(simd, &mut y));
         for (from, to) in self.order().iter().enumerate() {
             x[3 * *to as usize..3 * *to as usize + 3].copy_from_slice(&y[3 * from..3 * from + 3]);
         }

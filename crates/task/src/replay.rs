@@ -18,7 +18,8 @@ use xxhash_rust::xxh3::xxh3_64;
 const FORMAT: &str = "trocar-episode";
 /// Version 1 has no drawn values; the hashes of version 2 are of the text of an arm's state;
 /// version 3 is of contact of vertices alone, without instruments against solids; rules of version
-/// 4 switch contact off; the force guard of version 5 sees no torque.
+/// 4 switch contact off; the force guard of version 5 sees no torque; tissue of version 6 has no
+/// limit of stretch; jaws of version 7 hold what one blade presses.
 const VERSION: u32 = 8;
 
 /// The first bytes of every episode file.

@@ -30,7 +30,7 @@ mod xpbd_settings;
 pub use comparator::Comparator;
 pub use energy::Energy;
 pub use error::{Error, Result};
-pub use oracle::{Held, Newton, NewtonIntegrator, Oracle, OracleState, Tether};
+pub use oracle::{Held, Newton, NewtonIntegrator, Oracle, OracleState};
 pub use scheme::Scheme;
 pub use semi_implicit::SemiImplicit;
 pub use stable_step::stable_explicit_step;

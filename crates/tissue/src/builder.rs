@@ -190,8 +190,8 @@ impl ModelBuilder {
         Ok(self.bodies.len() - 1)
     }
 
-    /// Adds threads that hold nodes of the body at `index`. Integrators from outside this crate
-    /// ([`crate::Integrator`]) and [`crate::Batch`] ignore them.
+    /// Adds threads that hold nodes of the body at `index`. [`crate::Batch`] ignores them, and so
+    /// may integrators from outside this crate ([`crate::Integrator`]).
     ///
     /// # Errors
     /// The error names the body and the node. Refused are bodies that have not been added, nodes

@@ -64,9 +64,10 @@ pub struct ArmObservation {
     pub solid: DVec3,
     /// Largest magnitude of that force in a physics step of the period (N).
     pub solid_peak: f64,
-    /// Force with which tissue pushes the blades apart (N): the mean of both blades.
+    /// Force with which tissue pushes the blades apart (N): the mean of the contact forces on both,
+    /// and that of cutting.
     pub jaw_force: f64,
-    /// Force with which tissue pushes each blade outwards (N): the one that opens towards +y of the
+    /// Force with which contact pushes each blade outwards (N): the one that opens towards +y of the
     /// tip frame, and the one towards -y.
     pub blade_forces: [f64; 2],
     /// Whether the load of tissue was above the limit of the arm and was cut off there.

@@ -4,8 +4,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use trocar_geometry::{OrganAxis, TetMesh};
 use trocar_specimen::Threads;
-use trocar_tissue::pins;
-use trocar_tissue_reference::Tether;
+use trocar_tissue::{Tether, pins};
 
 /// Share of the organ's length at its base that does not move.
 const BASE: f64 = 0.08;
@@ -55,7 +54,6 @@ impl HiddenSupport {
     pub(super) fn tethers(self, mesh: &TetMesh, axis: &OrganAxis, up: DVec3, spacing: f64) -> Vec<Tether> {
         let Some(Threads { from, to, slack_m, stiffness_n_m2 }) = self.threads() else { return Vec::new() };
         let thread = |(node, step): (u32, f64)| Tether {
-            body: 0,
             node,
             anchor: mesh.vertices[node as usize],
             length: slack_m,

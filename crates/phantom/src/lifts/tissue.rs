@@ -104,9 +104,10 @@ impl Tissue {
             supports: vec![bed.into()],
         };
         builder.body(body).map_err(trocar_tissue_reference::Error::from)?;
-        let model = builder.build().map_err(trocar_tissue_reference::Error::from)?;
         let tethers = support.tethers(&mesh, &axis, up, THREAD_SPACING);
-        let mut oracle = Oracle::with_precision(&model, PRECISION).with_tethers(&tethers)?;
+        builder.tethers(0, &tethers).map_err(trocar_tissue_reference::Error::from)?;
+        let model = builder.build().map_err(trocar_tissue_reference::Error::from)?;
+        let mut oracle = Oracle::with_precision(&model, PRECISION);
         let mut state = OracleState::new(&model);
         oracle.settle(&model, &mut state, &[])?;
         let settled = state.positions(0).to_vec();

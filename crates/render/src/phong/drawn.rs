@@ -8,12 +8,16 @@
 use super::scene::View;
 use super::trace::{Hit, Tracer, intersect};
 use glam::{DVec2, DVec3};
+use trocar_camera::Camera;
 
 /// Rows of samples that share a list of triangles.
 const BAND: usize = 8;
 
 /// Margin of the boxes in samples. It covers rounding and the tolerance of the intersection.
 const MARGIN: f64 = 0.01;
+
+/// Distance of the plane in front of which triangles are drawn from that of the lens (m).
+const NEAR: f64 = 1e-6;
 
 /// The samples in the box around a triangle's projection: columns and rows, the ends included.
 #[derive(Clone, Copy)]
@@ -84,7 +88,7 @@ impl<'a> Hits<'a> {
     /// Where a row or column of samples is, in pixels.
     fn place(&self, sample: usize) -> f64 {
         let (pixel, within) = (sample / self.finer, sample % self.finer);
-        pixel as f64 + (within as f64 + 0.5) / self.finer as f64 - 0.5
+        pixel as f64 + ((within as f64 + 0.5) / self.finer as f64 - 0.5)
     }
 }
 
@@ -96,7 +100,7 @@ impl Drawing {
         let size = DVec2::new(columns as f64, rows as f64);
         let covered = tracer.corners().iter().map(|[a, ab, ac]| {
             let corners = [*a, *a + *ab, *a + *ac].map(|p| to_camera.transform(p));
-            covered(corners.map(|p| camera.project(p)), finer as f64, size)
+            covered(camera, corners, finer as f64, size)
         });
         let covered: Vec<Covered> = covered.collect();
         let bands_of = |c: &Covered| c.rows[0] as usize / BAND..(c.rows[1] as usize / BAND + 1).min(bands);
@@ -147,16 +151,24 @@ impl Covered {
     }
 }
 
-/// The samples in the box around corners at `pixels`, `finer` to a pixel, in a grid of `size`. None
-/// of a triangle behind the camera, all of one that is partly behind.
-fn covered(pixels: [Option<DVec2>; 3], finer: f64, size: DVec2) -> Covered {
+/// The samples in the box around what is seen of a triangle with its corners at `corners` (m, in
+/// the camera's frame), `finer` to a pixel, in a grid of `size`.
+fn covered(camera: &Camera, corners: [DVec3; 3], finer: f64, size: DVec2) -> Covered {
     let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-    for pixel in pixels.into_iter().flatten() {
-        let sample = (pixel + 0.5) * finer - 0.5;
-        (low, high) = (low.min(sample - MARGIN), high.max(sample + MARGIN));
-    }
-    if pixels.contains(&None) && pixels.iter().any(Option::is_some) {
-        (low, high) = (DVec2::ZERO, size);
+    let mut widen = |p: DVec3| {
+        if let Some(pixel) = camera.project(p) {
+            let sample = (pixel + 0.5) * finer - 0.5;
+            (low, high) = (low.min(sample - MARGIN), high.max(sample + MARGIN));
+        }
+    };
+    for k in 0..3 {
+        let (a, b) = (corners[k], corners[(k + 1) % 3]);
+        if a.z >= NEAR {
+            widen(a);
+        }
+        if (a.z >= NEAR) != (b.z >= NEAR) {
+            widen(a.lerp(b, (NEAR - a.z) / (b.z - a.z)));
+        }
     }
     let (low, high) = (low.ceil().max(DVec2::ZERO), high.floor().min(size - 1.0));
     if !low.cmple(high).all() {

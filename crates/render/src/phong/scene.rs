@@ -1,7 +1,7 @@
 //! Scenes of the simple renderer and their images.
 
-use super::shade::{Lit, shade};
 use super::drawn::{Hits, Row};
+use super::shade::{Lit, shade};
 use super::trace::{Hit, Tracer};
 use crate::srgb;
 use glam::DVec3;

@@ -73,6 +73,17 @@ const PAPER: PaperRollouts = PaperRollouts {
     rcm_within_5_mm: 84,
 };
 
+/// A grasp that did not last to the end of its rollout.
+#[derive(Clone, Debug, Serialize)]
+pub struct LostGrasp {
+    /// The controller.
+    pub policy: String,
+    /// The seed of the rollout.
+    pub seed: u64,
+    /// How it ended.
+    pub why: String,
+}
+
 /// Figures of the study.
 #[derive(Clone, Debug, Serialize)]
 pub struct RolloutsResult {
@@ -84,6 +95,8 @@ pub struct RolloutsResult {
     pub attached: usize,
     /// Of these, those that held it to the end.
     pub held_to_end: usize,
+    /// The others of these.
+    pub lost: Vec<LostGrasp>,
     /// Rollouts whose tissue or arms diverged.
     pub diverged: usize,
     /// Rollouts that passed all stages.
@@ -123,7 +136,7 @@ impl Study for RolloutsExperiment {
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> = Some("Campaign folder: a new one, or one of an earlier run to resume.");
     const WRITES_OWN_FILES: bool = true;
-    const SCHEMA: u32 = 2;
+    const SCHEMA: u32 = 3;
     type Figures = RolloutsResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(RolloutsResult, Document)> {
@@ -164,6 +177,14 @@ pub(super) fn campaign(scene: &SceneChoice, rollouts: usize, seed: u64, jobs: us
     })
 }
 
+impl LostGrasp {
+    fn of(record: &EpisodeRecord) -> Self {
+        let policy = record.name.clone();
+        let why = record.summary.why.clone().unwrap_or_else(|| "after all stages had passed".to_owned());
+        Self { policy, seed: record.seed, why }
+    }
+}
+
 impl RolloutsResult {
     fn of(made: CampaignResult, records: &[EpisodeRecord], report: String) -> Self {
         let attached: Vec<&EpisodeRecord> = records.iter().filter(|k| k.summary.attached).collect();
@@ -173,6 +194,7 @@ impl RolloutsResult {
             rollouts: records.len(),
             attached: attached.len(),
             held_to_end: attached.iter().filter(|k| k.summary.held_to_end).count(),
+            lost: attached.iter().filter(|k| !k.summary.held_to_end).map(|k| LostGrasp::of(k)).collect(),
             diverged: records.iter().filter(|k| k.summary.diverged).count(),
             passed: made.passed,
             lift_median_mm: median(attached.iter().filter_map(|k| k.summary.lift_mm).collect::<Vec<_>>()),
@@ -210,6 +232,7 @@ fn document(manifest: &Manifest, r: &RolloutsResult, records: &[EpisodeRecord]) 
         Card::new("Warnings", r.warnings.to_string(), Warnings::LEGEND).met(r.warnings.is_empty()),
     ];
     let outcome = Section::new("Outcome", lead).cards(cards).table(beside_paper(r));
+    let outcome = if r.lost.is_empty() { outcome } else { outcome.table(lost(&r.lost)) };
     let spread = Section::new("Lift and RCM deviation", "All rollouts that attached the organ.")
         .figures([lift_and_rcm(manifest, records)?, lifts(manifest, records)?]);
     let by_controller = Section::new("Controllers", "").table(controllers(&r.by_policy));
@@ -231,6 +254,17 @@ fn beside_paper(r: &RolloutsResult) -> Table {
         row("RCM within 5 mm", of(r.rcm_within_5_mm, r.attached), of(p.rcm_within_5_mm, p.attached)),
     ];
     Table::new(["", "here", "paper"], rows)
+}
+
+fn lost(rows: &[LostGrasp]) -> Table {
+    Table::of(
+        rows,
+        &[
+            ("grasp lost by", &|lost| lost.policy.clone()),
+            ("seed", &|lost| lost.seed.to_string()),
+            ("how it ended", &|lost| lost.why.clone()),
+        ],
+    )
 }
 
 fn controllers(rows: &[PolicyRow]) -> Table {

@@ -29,7 +29,7 @@ impl Factor {
         for (right, i) in self.right.chunks_exact_mut(3).zip(matrix.free()) {
             (-gradient[*i]).write_to_slice(right);
         }
-        self.cholesky.solve(&mut self.right);
+        self.cholesky.solve(Level::new(), &mut self.right);
         step.fill(DVec3::ZERO);
         for (right, i) in self.right.chunks_exact(3).zip(matrix.free()) {
             step[*i] = DVec3::from_slice(right);

@@ -47,7 +47,6 @@ pub use integrator::{Newton, NewtonIntegrator};
 pub use potential::elastic_energy;
 pub use solution::{Failure, Precision, Solution};
 pub use state::{Held, OracleState};
-pub use tether::Tether;
 
 use crate::{Error, Result};
 use contact::{Contacts, Touching};
@@ -57,7 +56,7 @@ use potential::{Elastic, Motion, Potential};
 use state::{Nodes, Stretches};
 use std::ops::Range;
 use trocar_core::Pose;
-use trocar_tissue::{Body, Model, ToolForce, ToolMotion};
+use trocar_tissue::{Body, Model, Tether, ToolForce, ToolMotion};
 
 /// Finds converged steps and equilibria of one model. It keeps the symbolic factorisations from
 /// step to step while the same nodes are held.
@@ -91,7 +90,7 @@ struct Group {
     elastic: Elastic,
     solver: Solver,
     touching: Touching,
-    /// Nodes are counted among those of the group.
+    /// The threads of its bodies. Nodes are counted among those of the group.
     tethers: Vec<Tether>,
 }
 
@@ -122,35 +121,10 @@ impl Oracle {
             let solver = Solver::of(&elastic, precision);
             let lengths = model.bodies()[bodies.clone()].iter().map(Body::len).collect();
             let touching = Touching::new(model, bodies.clone());
-            Group { touching, bodies, lengths, elastic, solver, tethers: Vec::new() }
+            let tethers = tethers(&model.bodies()[bodies.clone()]);
+            Group { touching, bodies, lengths, elastic, solver, tethers }
         };
         Self { groups: groups.into_iter().map(prepare).collect(), forces: Vec::new(), pushes: Vec::new() }
-    }
-
-    /// Ties nodes to fixed points.
-    ///
-    /// # Errors
-    /// A node that does not exist, a length or stiffness below 0, a number that is not finite.
-    pub fn with_tethers(mut self, tethers: &[Tether]) -> Result<Self> {
-        for tether in tethers {
-            let Tether { body, node, anchor, length, stiffness } = *tether;
-            let fine = anchor.is_finite() && length.is_finite() && length >= 0.0;
-            if !(fine && stiffness.is_finite() && stiffness >= 0.0) {
-                return Err(Error::Invalid(format!(
-                    "{tether:?}: its numbers must be finite, length and stiffness 0 or more"
-                )));
-            }
-            let group = self.groups.iter_mut().find(|group| group.bodies.contains(&body));
-            let length = group.as_ref().and_then(|g| g.lengths.get(body - g.bodies.start).copied());
-            match (group, length) {
-                (Some(group), Some(nodes)) if (node as usize) < nodes => {
-                    let first: usize = group.lengths[..body - group.bodies.start].iter().sum();
-                    group.tethers.push(Tether { node: node + first as u32, ..*tether });
-                }
-                _ => return Err(Error::Invalid(format!("{tether:?}: the model has no such node"))),
-            }
-        }
-        Ok(self)
     }
 
     /// Advances `state` by one step of implicit Euler of length `dt` (s), the counterpart of one
@@ -305,6 +279,16 @@ impl Oracle {
         }
         Ok(solutions)
     }
+}
+
+/// The threads of bodies, whose nodes follow each other.
+fn tethers(bodies: &[Body]) -> Vec<Tether> {
+    let (mut first, mut all) = (0, Vec::new());
+    for body in bodies {
+        all.extend(body.tethers().iter().map(|t| Tether { node: t.node + first, ..*t }));
+        first += body.len() as u32;
+    }
+    all
 }
 
 impl Group {

@@ -5,11 +5,11 @@ use super::contact::Contacts;
 use super::element::{deformation, projected};
 use super::rub::{self, outer};
 use super::state::Nodes;
-use super::tether::Tether;
+use super::tether;
 use glam::{DMat3, DVec3};
 use std::ops::Range;
 use trocar_tissue::assembly::{Stiffness, blocks, shape_gradients, tangent};
-use trocar_tissue::{Body, Hyperelastic, Support, SupportContact};
+use trocar_tissue::{Body, Hyperelastic, Support, SupportContact, Tether};
 
 /// Constants of the energies of a body, nodes in their original order; or of several bodies, one
 /// after the other.
@@ -199,7 +199,7 @@ impl Potential<'_> {
             out[i] += contact.gradient;
         });
         for tether in self.tethers {
-            let (stored, pull) = tether.energy(x[tether.node as usize]);
+            let (stored, pull) = tether::energy(tether, x[tether.node as usize]);
             energy += stored;
             out[tether.node as usize] += pull;
         }
@@ -253,7 +253,7 @@ impl Potential<'_> {
         });
         for tether in self.tethers {
             let i = tether.node as usize;
-            into.add(i, i, tether.hessian(x[i]));
+            into.add(i, i, tether::hessian(tether, x[i]));
         }
         if let Some(contacts) = &self.contacts {
             contacts.hessian(x, project, secant, into);

@@ -155,7 +155,7 @@ impl Lattice<'_> {
         for (numbers, v) in numbers.chunks_exact_mut(3).zip(vector.iter()) {
             v.write_to_slice(numbers);
         }
-        cholesky.solve(numbers);
+        cholesky.solve(Level::new(), numbers);
         for (numbers, v) in numbers.chunks_exact(3).zip(vector) {
             *v = DVec3::from_slice(numbers);
         }

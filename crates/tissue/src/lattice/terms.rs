@@ -50,18 +50,19 @@ pub(super) struct Term {
 }
 
 /// What a term exerts.
-struct Value {
+struct Response {
     /// (J).
     energy: f64,
     /// Gradient by the point (N).
     force: DVec3,
+    /// Of a contact; zero of a spring.
     normal: DVec3,
     /// Stiffness along the normal and across it (N/m).
     along: f64,
     across: f64,
 }
 
-impl Value {
+impl Response {
     /// Second derivative by the point (N/m), positive semidefinite.
     fn stiffness(&self) -> DMat3 {
         let n = self.normal;
@@ -131,11 +132,11 @@ impl Term {
     }
 
     /// What acts with the point at `p` (m), if anything does.
-    fn value(&self, p: DVec3) -> Option<Value> {
+    fn value(&self, p: DVec3) -> Option<Response> {
         let (k, off) = (self.stiffness, p - self.place);
         let Law::Contact { normal, point, .. } = self.law else {
             let energy = 0.5 * k * off.length_squared();
-            return Some(Value { energy, force: k * off, normal: DVec3::ZERO, along: k, across: k });
+            return Some(Response { energy, force: k * off, normal: DVec3::ZERO, along: k, across: k });
         };
         let [force, mut energy, along] = self.press((p - point).dot(normal));
         if along == 0.0 && self.limit <= 0.0 {
@@ -146,12 +147,12 @@ impl Term {
         let slides = k * length > self.limit;
         let across = if slides { self.limit / length } else { k };
         energy += if slides { self.limit * (length - 0.5 * self.limit / k) } else { 0.5 * k * length * length };
-        Some(Value { energy, force: force * normal + across * off, normal, along, across })
+        Some(Response { energy, force: force * normal + across * off, normal, along, across })
     }
 
     /// Adds the gradient with the point at `p` (N); returns the energy (J).
     pub fn add_gradient(&self, p: DVec3, gradient: &mut [Vec<DVec3>]) -> f64 {
-        let Some(Value { energy, force, .. }) = self.value(p) else { return 0.0 };
+        let Some(Response { energy, force, .. }) = self.value(p) else { return 0.0 };
         for share in self.shares() {
             if let Place::Embedded(point) = &share.place {
                 point.spread(share.share * force, &mut gradient[share.member]);

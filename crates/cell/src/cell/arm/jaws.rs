@@ -80,7 +80,7 @@ impl ArmUnit {
         let (region, opening) = (self.jaw_region(), self.opening());
         let Self { model, state, .. } = self;
         let on_blades = blade_forces(&state.gripper, Tools::of(0), &state.forces);
-        let closing_force_n = opening_force(&state.gripper, Tools::of(0), &state.forces);
+        let closing_force_n = 0.5 * on_blades.iter().sum::<f64>();
         if on_blades.into_iter().any(|force| force < BOTH_PRESS * closing_force_n) {
             return;
         }

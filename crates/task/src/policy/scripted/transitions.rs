@@ -13,8 +13,8 @@ use trocar_scene::{Condition, TaskName};
 const MAX_SPREAD: f64 = 0.8;
 pub(super) const WATCHED_SPREAD: f64 = 0.2;
 
-/// Jaws that stop above this share of their opening have not closed. They back off so many times,
-/// and as often from what one blade alone presses on.
+/// Jaws that stop above this share of their opening have not closed. They back off at most so often,
+/// whatever keeps them open.
 const KEPT_OPEN: f64 = 0.85;
 const MAX_BACKS: usize = 4;
 
@@ -160,9 +160,9 @@ impl Scripted {
     pub(super) fn lone_blade(&self, episode: &Episode) -> Option<f64> {
         let arm = &episode.cell().observe()[episode.roles().0?];
         let looks = self.style == Style::Careful && !arm.attached;
-        let alone = |force: f64| force > 2.0 * ALONE * arm.jaw_force;
-        let [plus, minus] = arm.blade_forces.map(alone);
-        let open = arm.measured.jaw() > LEAST_OPENING && arm.jaw_force > TOUCH;
+        let both = arm.blade_forces[0] + arm.blade_forces[1];
+        let [plus, minus] = arm.blade_forces.map(|force| force > ALONE * both);
+        let open = arm.measured.jaw() > LEAST_OPENING && 0.5 * both > TOUCH;
         (looks && open && (plus || minus)).then_some(if plus { 1.0 } else { -1.0 })
     }
 
