@@ -136,7 +136,7 @@ impl Study for RolloutsExperiment {
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> = Some("Campaign folder: a new one, or one of an earlier run to resume.");
     const WRITES_OWN_FILES: bool = true;
-    const SCHEMA: u32 = 3;
+    const SCHEMA: u32 = 2;
     type Figures = RolloutsResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(RolloutsResult, Document)> {
