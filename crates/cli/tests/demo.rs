@@ -28,6 +28,8 @@ fn the_demo_lifts_the_appendix_of_a_reconstructed_phantom() {
     }
     let report = std::fs::read_to_string(said["report"].as_str().unwrap()).unwrap();
     assert!(report.starts_with("<!DOCTYPE html>") && report.contains("appendix"));
+    let index = std::fs::read_to_string(output.join("index.html")).unwrap();
+    assert!(index.contains("content=\"0; url=run/report.html\"") && output.join("run/report.html").is_file());
     for file in ["recording/recording.toml", "specimen/specimen.toml", "run/result.json", "run/channels.csv"] {
         assert!(output.join(file).is_file(), "{file}");
     }

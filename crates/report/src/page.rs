@@ -38,6 +38,13 @@ pub fn page(title: &str, subtitle: &str, body: &str) -> String {
     )
 }
 
+/// The page, which the browser loads again after so many seconds, or leaves then for `to`, a
+/// relative address in plain text.
+pub fn refreshed(page: &str, seconds: u32, to: Option<&str>) -> String {
+    let to = to.map_or_else(String::new, |to| format!("; url={}", escape(to)));
+    page.replacen("<head>\n", &format!("<head>\n<meta http-equiv=\"refresh\" content=\"{seconds}{to}\">\n"), 1)
+}
+
 /// A section. `title` is plain text, `lead` and `body` are HTML.
 pub fn section(title: &str, lead: &str, body: &str) -> String {
     let lead = if lead.is_empty() { String::new() } else { format!("<p class=\"lead\">{lead}</p>\n") };

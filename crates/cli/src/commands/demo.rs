@@ -3,12 +3,20 @@
 use crate::cli;
 use crate::commands::{reconstruct, simulate};
 use crate::{open, output};
+use std::path::Path;
 use trocar_core::Progress;
 use trocar_workflow::{Demo, DemoResult, Result};
 
 pub fn run(arguments: &cli::Demo, json: bool, progress: &dyn Progress) -> Result<()> {
     let demo = Demo { frames: arguments.frames, seed: arguments.seed, threads: arguments.threads };
-    let result = demo.run(&arguments.output, progress)?;
+    let opens = !arguments.no_open && !json && std::env::var_os("CI").is_none();
+    let show = |page: &Path| {
+        if opens {
+            let page = page.display().to_string();
+            open::in_browser(&page, &page);
+        }
+    };
+    let result = demo.run(&arguments.output, &show, progress)?;
     output::print(json, &result, |r: &DemoResult| {
         format!(
             "{}\n\n{}\n\n{:.0} s in total; report {}",
@@ -18,8 +26,5 @@ pub fn run(arguments: &cli::Demo, json: bool, progress: &dyn Progress) -> Result
             r.lift.report
         )
     });
-    if !arguments.no_open && !json && std::env::var_os("CI").is_none() {
-        open::in_browser(&result.lift.report, "the report");
-    }
     Ok(())
 }
