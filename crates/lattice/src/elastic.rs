@@ -28,10 +28,7 @@ impl Body {
     fn add_elastic_in<S: Simd>(&self, simd: S, x: &[DVec3], flow: &Flow, gradient: &mut [DVec3]) -> (f64, f64) {
         let (mut energy, mut least) = (0.0, f64::INFINITY);
         for (i, hex) in self.lattice().hexahedra().iter().enumerate() {
-            let before = match flow.before.get(i) {
-                Some(before) => Some((flow, before)),
-                None => None,
-            };
+            let before = flow.before.get(i).map(|before| (flow, before));
             let (part, forces, ratio) = self.element(i).forces(simd, &self.corners(i, x), before);
             energy += part;
             least = least.min(ratio);
