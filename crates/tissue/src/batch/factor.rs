@@ -265,7 +265,7 @@ mod tests {
                 for (place, node) in order.iter().enumerate() {
                     (0..3).for_each(|k| expected[3 * *node as usize + k] = right(lane, place, k));
                 }
-                cholesky.solve(&mut expected);
+                cholesky.solve(level, &mut expected);
                 for (place, node) in order.iter().enumerate() {
                     for k in 0..3 {
                         let off = f64::from(x[place][k].0[lane]) - expected[3 * *node as usize + k];
