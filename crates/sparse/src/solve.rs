@@ -9,8 +9,8 @@ use fearless_simd::{Level, Simd, SimdBase, dispatch};
 type Sums<T, S> = [<T as Real>::Vector<S>; COLUMNS];
 
 impl<T: Real> Cholesky<T> {
-    /// Solves A x = b in place, three numbers a node, nodes as the matrix numbers them, with vectors
-    /// of `level`. The bits do not depend on it.
+    /// Solves A x = b in place, three numbers a node, nodes as the matrix numbers them, with
+    /// vectors of `level`. The bits do not depend on it.
     pub fn solve(&self, level: Level, x: &mut [T]) {
         let mut y: Vec<T> = Vec::with_capacity(x.len());
         for i in self.order() {

@@ -67,8 +67,8 @@ pub struct ArmObservation {
     /// Force with which tissue pushes the blades apart (N): the mean of the contact forces on both,
     /// and that of cutting.
     pub jaw_force: f64,
-    /// Force with which contact pushes each blade outwards (N): the one that opens towards +y of the
-    /// tip frame, and the one towards -y.
+    /// Force with which contact pushes each blade outwards (N): the one that opens towards +y of
+    /// the tip frame, and the one towards -y.
     pub blade_forces: [f64; 2],
     /// Whether the load of tissue was above the limit of the arm and was cut off there.
     pub load_limited: bool,

@@ -7,8 +7,8 @@ pub(super) enum Phase {
     Enter,
     /// Open blades back out of tissue that presses them apart.
     BackOut,
-    /// Jaws that do not close on the tissue open again and back out a little: it keeps them open, or
-    /// one blade alone presses on something else.
+    /// Jaws that do not close on the tissue open again and back out a little: it keeps them open,
+    /// or one blade alone presses on something else.
     BackOff,
     Close,
     Drag,

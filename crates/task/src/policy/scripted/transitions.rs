@@ -13,8 +13,8 @@ use trocar_scene::{Condition, TaskName};
 const MAX_SPREAD: f64 = 0.8;
 pub(super) const WATCHED_SPREAD: f64 = 0.2;
 
-/// Jaws that stop above this share of their opening have not closed. They back off at most so often,
-/// whatever keeps them open.
+/// Jaws that stop above this share of their opening have not closed. They back off at most so
+/// often, whatever keeps them open.
 const KEPT_OPEN: f64 = 0.85;
 const MAX_BACKS: usize = 4;
 
@@ -155,8 +155,9 @@ impl Scripted {
         self.style == Style::Careful && (open || self.lone_blade(episode).is_some())
     }
 
-    /// The side of the blade that alone keeps the jaws from closing, because it presses on something
-    /// beside the tissue: 1 for the one that opens towards +y of the tip, -1 for the other.
+    /// The side of the blade that alone keeps the jaws from closing, because it presses on
+    /// something beside the tissue: 1 for the one that opens towards +y of the tip, -1 for the
+    /// other.
     pub(super) fn lone_blade(&self, episode: &Episode) -> Option<f64> {
         let arm = &episode.cell().observe()[episode.roles().0?];
         let looks = self.style == Style::Careful && !arm.attached;
