@@ -148,6 +148,15 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_guide_names_every_number() {
+        let page = include_str!("../../../docs/guides/observations.md");
+        for name in STATE_NAMES {
+            let bare = name.trim_start_matches("left_").trim_start_matches("right_");
+            assert!(page.contains(&format!("`{bare}`")), "docs/guides/observations.md lacks `{bare}`");
+        }
+    }
+
+    #[test]
     fn there_are_as_many_numbers_as_names() {
         let seen = Observation { stage: 3.0, ..Observation::default() };
         let all = seen.to_vec();

@@ -13,7 +13,7 @@ use trocar_scene::{Condition, TaskName};
 const MAX_SPREAD: f64 = 0.8;
 pub(super) const WATCHED_SPREAD: f64 = 0.2;
 
-/// Jaws that stop above this share of their opening have not closed. They back off at most so
+/// Jaws that stop above this share of their opening have not closed. They back off at most this
 /// often, whatever keeps them open.
 const KEPT_OPEN: f64 = 0.85;
 const MAX_BACKS: usize = 4;
