@@ -206,7 +206,14 @@ impl AppendixChoice {
             return Ok((Specimen::read(folder)?, folder.clone()));
         }
         let folder = output.join("phantom-a");
-        let specimen = phantoms::specimen("phantom-a", &self.recorded.options(), None, &folder, progress)?;
+        let specimen = phantoms::specimen(
+            "phantom-a",
+            &self.recorded.options(),
+            None,
+            &folder,
+            phantoms::AfterUse::Keep,
+            progress,
+        )?;
         Ok((specimen, folder.join("specimen")))
     }
 }

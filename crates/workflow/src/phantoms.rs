@@ -33,6 +33,15 @@ pub fn recorded(phantom: &str, options: &RecordOptions, dir: &Path, progress: &d
     Ok(trocar_phantom::record(phantom, options, dir, progress)?)
 }
 
+/// What becomes of a phantom's recording once its specimen is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AfterUse {
+    /// It stays beside the specimen.
+    Keep,
+    /// It is removed: it takes thirty times as much room.
+    Remove,
+}
+
 /// The file with the program and options that made a kept specimen; it is reused only for the same.
 const STAMP: &str = "made-by";
 
@@ -42,7 +51,7 @@ fn specimen_and_stamp(folder: &Path, max_elements: Option<u32>) -> (PathBuf, Pat
     (folder.join(format!("specimen{ending}")), folder.join(format!("{STAMP}{ending}.txt")))
 }
 
-/// `phantom`, recorded into `folder/recording` and reconstructed with the default settings into
+/// `phantom`, recorded into `folder/recording`, where the recording stays or not, and reconstructed with the default settings into
 /// `folder/specimen`, or with about `max_elements` an organ at most into `folder/specimen-NUMBER`.
 /// A specimen of an earlier run is reused if the same program would make the same. If several
 /// processes need it at once, one makes it and the others wait.
@@ -54,6 +63,7 @@ pub fn specimen(
     options: &RecordOptions,
     max_elements: Option<u32>,
     folder: &Path,
+    after: AfterUse,
     progress: &dyn Progress,
 ) -> Result<Specimen> {
     let mut settings = Settings::default();
@@ -64,9 +74,14 @@ pub fn specimen(
     std::fs::create_dir_all(folder).map_err(io)?;
     let lock = File::create(folder.join(".lock")).map_err(io)?;
     lock.lock().map_err(io)?;
+    let tidy = || match (after == AfterUse::Remove).then(|| std::fs::remove_dir_all(&recording)) {
+        Some(Err(source)) if source.kind() != ErrorKind::NotFound => Err(Error::Io { path: recording.clone(), source }),
+        _ => Ok(()),
+    };
     if std::fs::read_to_string(&path).is_ok_and(|kept| kept == stamp)
         && let Ok(kept) = Specimen::read(&specimen)
     {
+        tidy()?;
         return Ok(kept);
     }
     // Without the stamp, nobody reuses the folder while it is made.
@@ -77,6 +92,7 @@ pub fn specimen(
     recorded(phantom, options, &recording, progress)?;
     reconstruct_recording(&recording, &settings, &specimen, progress)?;
     std::fs::write(&path, &stamp).map_err(io)?;
+    tidy()?;
     // Reads the specimen back: its bits must not depend on who made it.
     Ok(Specimen::read(&specimen)?)
 }
@@ -138,7 +154,7 @@ pub fn source_specimen(
         Some(Source::Folder(path)) => Specimen::read(&folder.join(path))?,
         Some(Source::Phantom(name, seed)) => {
             let options = RecordOptions { frames: FRAMES, seed: u64::from(seed), ..RecordOptions::default() };
-            specimen(name, &options, source.max_elements, &kept_in(phantoms, name, seed), progress)?
+            specimen(name, &options, source.max_elements, &kept_in(phantoms, name, seed), AfterUse::Remove, progress)?
         }
         None => return Err(Error::Mismatch("the scene names neither a specimen folder nor a phantom".to_owned())),
     };

@@ -110,8 +110,14 @@ impl Study for SettlingExperiment {
         let named = phantoms_or_papers(&self.phantoms);
         let mut rows = Vec::with_capacity(named.len());
         for phantom in &named {
-            let specimen =
-                phantoms::specimen(phantom, &self.recorded.options(), None, &job.output().join(phantom), job.progress)?;
+            let specimen = phantoms::specimen(
+                phantom,
+                &self.recorded.options(),
+                None,
+                &job.output().join(phantom),
+                phantoms::AfterUse::Keep,
+                job.progress,
+            )?;
             rows.push(released(phantom, World::new(&specimen, schedule, self.threads)?, job.progress)?);
         }
         let result = SettlingResult { phantoms: rows, schedule: self.schedule.name().to_owned() };

@@ -145,6 +145,7 @@ impl IntegratorsExperiment {
             &self.recorded.options(),
             None,
             &job.output().join("phantom-a"),
+            phantoms::AfterUse::Keep,
             job.progress,
         )?;
         Ok(World::new(&specimen, SolverSettings::default(), 1)?.model)

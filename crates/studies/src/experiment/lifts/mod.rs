@@ -86,7 +86,8 @@ impl Study for LiftsExperiment {
         let folder = job.output().join("phantom-a");
         let lifts = LiftOptions { count: self.lifts, support: self.true_support.into(), ..LiftOptions::default() };
         let options = RecordOptions { frames: 181, seed: self.seed, sensor: Sensor::Stereo, lifts };
-        let specimen = phantoms::specimen("phantom-a", &options, None, &folder, job.progress)?;
+        let specimen =
+            phantoms::specimen("phantom-a", &options, None, &folder, phantoms::AfterUse::Keep, job.progress)?;
         let appendix = LoneOrgan::of(&specimen, "appendix")?;
         let recording = Recording::open(&folder.join("recording"))?;
         let measured = measure_recording(&recording, job.progress)?;
