@@ -179,6 +179,7 @@ fn a_phantom_is_kept_for_every_working_folder() {
     run(&["render", "cell-a", "--size", "32x24", "-o", "first.png"]);
     assert!(cache.path().join("phantom-a-1/specimen/specimen.toml").is_file());
     assert!(!here.path().join("trocar-phantoms").exists());
+    assert!(!cache.path().join("phantom-a-1/recording").exists(), "it takes thirty times as much room");
     let made = std::fs::metadata(cache.path().join("phantom-a-1/specimen/specimen.toml")).unwrap().modified().unwrap();
     run(&["render", "cell-a", "--size", "32x24", "-o", "second.png"]);
     let kept = std::fs::metadata(cache.path().join("phantom-a-1/specimen/specimen.toml")).unwrap().modified().unwrap();
