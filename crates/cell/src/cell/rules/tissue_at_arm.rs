@@ -10,6 +10,10 @@ use crate::cell::arm::ArmUnit;
 const MAX_STRETCH: f64 = 4.0;
 const MIN_VOLUME: f64 = 0.03;
 
+/// Elements below this share of their rest volume count as those at it: an element of a lattice's
+/// mesh may be flat or inside out, and a load must stay finite.
+const LEAST_VOLUME: f64 = 1e-3;
+
 /// Tissue with an element below this share of its rest volume is squeezed between the instrument
 /// and something hard, which then is nearer than ...
 const SQUEEZED: f64 = 0.4;
@@ -51,7 +55,7 @@ impl TissueAtArm {
 
     /// The share of its limit that it has. Squared, because arms come near the limits fast.
     pub fn share(&self) -> f64 {
-        let crushed = if self.held { 0.0 } else { MIN_VOLUME / self.volume.max(f64::MIN_POSITIVE) };
+        let crushed = if self.held { 0.0 } else { MIN_VOLUME / self.volume.max(LEAST_VOLUME) };
         (self.stretch / MAX_STRETCH).max(crushed).powi(2)
     }
 
@@ -68,5 +72,18 @@ impl TissueAtArm {
     pub fn numbers(&self) -> [f64; 3] {
         let Self { stretch, volume, held } = *self;
         [stretch, volume, f64::from(u8::from(held))]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tissue_that_is_flat_or_inside_out_has_a_finite_share() {
+        for volume in [1e-2, 1e-6, 0.0, -0.5] {
+            let share = TissueAtArm { volume, ..TissueAtArm::default() }.share();
+            assert!(share > 1.0 && share < 1e4, "{volume}: {share}");
+        }
     }
 }
