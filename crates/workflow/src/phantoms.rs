@@ -51,10 +51,10 @@ fn specimen_and_stamp(folder: &Path, max_elements: Option<u32>) -> (PathBuf, Pat
     (folder.join(format!("specimen{ending}")), folder.join(format!("{STAMP}{ending}.txt")))
 }
 
-/// `phantom`, recorded into `folder/recording`, where the recording stays or not, and reconstructed with the default settings into
-/// `folder/specimen`, or with about `max_elements` an organ at most into `folder/specimen-NUMBER`.
-/// A specimen of an earlier run is reused if the same program would make the same. If several
-/// processes need it at once, one makes it and the others wait.
+/// `phantom`, recorded into `folder/recording`, where the recording stays or not, and reconstructed
+/// with the default settings into `folder/specimen`, or with about `max_elements` an organ at most
+/// into `folder/specimen-NUMBER`. A specimen of an earlier run is reused if the same program would
+/// make the same. If several processes need it at once, one makes it and the others wait.
 ///
 /// # Errors
 /// A phantom that is not known, a folder that cannot be written.
