@@ -12,7 +12,7 @@ use super::elastic::add_elastic;
 use super::factor::Field;
 use super::group::Group;
 use super::topology::{ModulusFactor, Topology};
-use super::warp::{self, Rotations};
+use super::warp::{self, Rotations, Stiffening};
 use crate::registers::{BLOCK, Block, Mask, Reg, bits, lanes, load, part_of, splat, store};
 use fearless_simd::{Select, Simd, SimdBase, SimdMask};
 
@@ -53,6 +53,7 @@ pub(super) struct Scratch {
     direction: Field,
     solution: Field,
     rotations: Rotations,
+    stiffening: Stiffening,
     pairs: Vec<Pair>,
 }
 
@@ -90,13 +91,16 @@ impl Scratch {
             direction: field(),
             solution: field(),
             rotations: vec![[Block([0.0; BLOCK]); 9]; count],
+            stiffening: vec![Block([1.0; BLOCK]); count],
             pairs: (0..MEMORY).map(|_| pair()).collect(),
         }
     }
 
     /// Bytes.
     pub fn bytes(&self) -> usize {
-        (7 + 2 * MEMORY) * size_of_val(&self.start[..]) + size_of_val(&self.rotations[..])
+        (7 + 2 * MEMORY) * size_of_val(&self.start[..])
+            + size_of_val(&self.rotations[..])
+            + size_of_val(&self.stiffening[..])
     }
 }
 
@@ -127,7 +131,7 @@ pub(super) fn substep<S: Simd>(
         }
         least = evaluate(simd, topology, group, &scratch.predictor, &group.u, &mut scratch.gradient, part);
     }
-    warp::update(simd, topology, &group.u, &mut scratch.rotations, part);
+    warp::update(simd, topology, &group.u, &mut scratch.rotations, &mut scratch.stiffening, part);
     let mut way = distance(simd, topology, &group.u, &scratch.start, part);
     let tolerance = splat(simd, ends.tolerance);
     let mut done: Mask<S> = lanes(simd, idle);

@@ -2,7 +2,11 @@
 //! in which the stiffness at rest holds (stiffness warping, Mueller and others, "Stable real-time
 //! deformations", 2002).
 //!
-//! It only speeds the search up: any invertible matrices in place of the rotations keep the
+//! Tissue whose areas grow becomes stiffer against changes of volume. Steps of the stiffness at
+//! rest are too long there: they are rejected, or what is too much in one substep grows in the
+//! next. So both sides are divided by the root of this stiffening too.
+//!
+//! All this only speeds the search up: any invertible matrices in place of the rotations keep the
 //! preconditioner symmetric and positive definite. So a few rounds of the polar decomposition are
 //! enough.
 
@@ -17,8 +21,14 @@ const ROUNDS: usize = 3;
 /// Volume ratio below which a neighbourhood is not turned.
 pub(super) const MIN_RATIO: f32 = 0.05;
 
-/// Rotations by node, each by columns.
+/// Greatest stiffening of a node.
+const MAX_STIFFENING: f32 = 20.0;
+
+/// A rotation by node, by columns, over the root of the node's stiffening.
 pub(super) type Rotations = Vec<[Block<f32>; 9]>;
+
+/// Stiffening by node: how many times the stiffness at rest the tissue about it has.
+pub(super) type Stiffening = Vec<Block<f32>>;
 
 /// Computes the rotations at the displacements `u` (in cells).
 #[inline(always)]
@@ -27,17 +37,23 @@ pub(super) fn update<S: Simd>(
     topology: &Topology,
     u: &[[Block<f32>; 3]],
     rotations: &mut [[Block<f32>; 9]],
+    stiffening: &mut [Block<f32>],
     part: usize,
 ) {
-    let zero = splat(simd, 0.0);
-    for rotation in rotations.iter_mut() {
+    let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
+    for (rotation, stiffening) in rotations.iter_mut().zip(stiffening.iter_mut()) {
         for e in 0..9 {
             store::<S>(zero, &mut rotation[e], part);
         }
+        store::<S>(one, stiffening, part);
     }
     for cell in &topology.cells {
+        let mut f = [zero; 9];
         for k in 0..3 {
             let m = modes(simd, u, &cell.nodes, k, part);
+            for c in 0..3 {
+                f[3 * c + k] = if c == k { m[c] + 1.0 } else { m[c] };
+            }
             for node in &cell.nodes {
                 let rotation = &mut rotations[*node as usize];
                 for c in 0..3 {
@@ -46,8 +62,13 @@ pub(super) fn update<S: Simd>(
                 }
             }
         }
+        let stiffer = stiffer(simd, &f);
+        for node in &cell.nodes {
+            let to = &mut stiffening[*node as usize];
+            store::<S>(stiffer.max(load(simd, to, part)), to, part);
+        }
     }
-    for (rotation, weight) in rotations.iter_mut().zip(&topology.turning) {
+    for ((rotation, weight), stiffening) in rotations.iter_mut().zip(&topology.turning).zip(stiffening) {
         let mut f = [zero; 9];
         for e in 0..9 {
             f[e] = load(simd, &rotation[e], part) * *weight;
@@ -56,10 +77,26 @@ pub(super) fn update<S: Simd>(
             f[4 * c] += 1.0;
         }
         let r = polar(simd, f);
+        let scale = one / load(simd, stiffening, part).sqrt();
         for e in 0..9 {
-            store::<S>(r[e], &mut rotation[e], part);
+            store::<S>(r[e] * scale, &mut rotation[e], part);
         }
     }
+}
+
+/// The largest square of an area over the area at rest, nearly: the sum of the three less 2, which
+/// is right where the other two are as at rest. The stiffness against changes of volume grows by
+/// it. 1 where F is not finite.
+#[inline(always)]
+fn stiffer<S: Simd>(simd: S, f: &[Reg<S>; 9]) -> Reg<S> {
+    let one = splat(simd, 1.0);
+    let (cofactor, _) = areas(f);
+    let mut sum = splat(simd, -2.0);
+    for e in 0..9 {
+        sum += cofactor[e] * cofactor[e];
+    }
+    // NaN compares false.
+    sum.simd_gt(one).select(sum.min(splat(simd, MAX_STIFFENING)), one)
 }
 
 /// The rotation of F, nearly: Newton's iteration (Higham, "Computing the polar decomposition",

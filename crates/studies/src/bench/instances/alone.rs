@@ -1,8 +1,8 @@
 //! The ways to step one instance alone, and their errors.
 
-use super::scene::Scene;
+use super::scene::{Scene, moving};
 use crate::Result;
-use crate::scenes::{BenchScene, FRAME, OracleRun, Run, rest_positions, rms_error};
+use crate::scenes::{FRAME, OracleRun, Run, rest_positions, rms_error};
 use serde::Serialize;
 use trocar_tissue::{QuasiNewton, SolverSettings};
 
@@ -19,7 +19,7 @@ pub struct Alone {
     pub name: &'static str,
     /// Relative tolerance of its search.
     pub relative: f64,
-    /// Nodes of its mesh.
+    /// Nodes that can move: of its mesh, or of the lattice.
     pub nodes: usize,
     /// RMS distance from the converged solution of the same substeps over RMS displacement.
     pub error: f64,
@@ -70,12 +70,11 @@ pub(super) fn errors(
         }
     }
     let truths = [oracle.positions(), judge.positions()];
-    let nodes = |scene: &BenchScene| scene.model.bodies().iter().map(|b| b.len()).sum();
     let way = |(number, run): (usize, &Run<'_>)| {
         let on = number / RELATIVE.len();
         let mesh = [&scene.tets, &scene.lattice][on];
         let error = rms_error(&run.positions(), &truths[on], &rest_positions(&mesh.model));
-        let nodes = [nodes(mesh), scene.nodes()][on];
+        let nodes = [moving(mesh), scene.nodes()][on];
         Alone { name: NAMES[on], relative: RELATIVE[number % RELATIVE.len()], nodes, error }
     };
     Ok(runs.iter().enumerate().map(way).collect())

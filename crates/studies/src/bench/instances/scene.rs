@@ -54,7 +54,7 @@ pub(super) struct Scene {
     pub points: Vec<EmbeddedPoint>,
     /// Where the tools begin (m).
     jaws: DVec3,
-    /// Tetrahedra of about the same number of nodes.
+    /// Tetrahedra of about the same number of nodes that can move.
     pub tets: BenchScene,
     /// The nodes of these in the same lattice.
     pub lattice: BenchScene,
@@ -80,14 +80,14 @@ impl Scene {
         let (grip, points) = (lattice.embed(&held).map_err(of_lattice)?, lattice.embed_nodes().map_err(of_lattice)?);
         let pins = lattice.embed_held(&pinned).map_err(of_lattice)?;
         let body = body(lattice, pins, MODULUS)?;
-        let coarse = mesh_of(nodes)?;
+        let (coarse, tets) = mesh_of(nodes, undamped)?;
         let settings = LatticeSettings { cell, law: Law::StableNeoHookean };
         Ok(Self {
             body,
             grip,
             points,
             jaws,
-            tets: BenchScene::drag(&coarse, undamped)?,
+            tets,
             lattice: BenchScene::drag_on(&coarse, undamped, Backend::Lattice(settings))?,
         })
     }
@@ -230,19 +230,26 @@ fn lattice_of(mesh: &TetMesh, nodes: usize, fill: f64) -> Result<Lattice> {
     Ok(best)
 }
 
-/// The organ of tetrahedra with the number of nodes nearest to `nodes` that was found.
-fn mesh_of(nodes: usize) -> Result<Organs> {
-    let mut tets = 3 * nodes;
-    let mut best: Option<Organs> = None;
+/// The organ of tetrahedra with the number of nodes that can move nearest to `nodes` that was found.
+/// Those that are pinned are no unknowns; all of the lattice's are.
+fn mesh_of(nodes: usize, material: Material) -> Result<(Organs, BenchScene)> {
+    let mut tets = 5 * nodes;
+    let mut best: Option<(Organs, BenchScene)> = None;
     for _ in 0..MESH_ROUNDS {
         let organs = Organs::analytic_largest(tets)?;
-        let count = organs.nodes();
+        let scene = BenchScene::drag(&organs, material)?;
+        let count = moving(&scene);
         tets = (tets * nodes).div_ceil(count.max(1));
-        if best.as_ref().is_none_or(|best| count.abs_diff(nodes) < best.nodes().abs_diff(nodes)) {
-            best = Some(organs);
+        if best.as_ref().is_none_or(|(_, best)| count.abs_diff(nodes) < moving(best).abs_diff(nodes)) {
+            best = Some((organs, scene));
         }
     }
     best.ok_or_else(|| Error::Mismatch(format!("a cecum of {nodes} nodes cannot be meshed")))
+}
+
+/// Nodes that can move.
+pub(super) fn moving(scene: &BenchScene) -> usize {
+    scene.model.bodies().iter().flat_map(|body| body.pinned()).filter(|pinned| !**pinned).count()
 }
 
 /// An error of the lattice, as one of a study.
