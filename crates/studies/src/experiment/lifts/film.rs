@@ -1,6 +1,7 @@
 //! The film of a lift that was not fitted, beside the same lift simulated with the identified
 //! support.
 
+use super::identified::organ_of;
 use super::result::{FoldRow, JudgedRow};
 use crate::Result;
 use trocar_core::Progress;
@@ -8,7 +9,7 @@ use trocar_identify::{Grip, LoneOrgan, SeenLift};
 use trocar_measure::RecordingFilm;
 use trocar_recording::Recording;
 use trocar_report::table::or_dash;
-use trocar_specimen::{Parameter, Posterior, Specimen};
+use trocar_specimen::Specimen;
 use trocar_workflow::lift_film::{LiftFilm, ShownLift, Simulated};
 
 /// The film, and the lift that it shows.
@@ -37,9 +38,7 @@ pub(super) fn held_out(
 ) -> Result<Option<HeldOutFilm>> {
     let Some((fold, judged)) = middle(folds) else { return Ok(None) };
     let Some((number, seen)) = lifts.iter().find(|(number, _)| *number == judged.lift) else { return Ok(None) };
-    let known = fold.values.iter().filter_map(|(name, value)| Some((Parameter::named(name)?, *value)));
-    let values: Vec<(Parameter, f64)> = known.collect();
-    let organ = appendix.with(|organ| Posterior::apply(&values, organ));
+    let organ = organ_of(fold, appendix);
     let made = Simulated { specimen, organ: &organ, seen, grip: Grip::Place };
     let lift = ShownLift { number: *number, rate_hz: recording.info.rate_hz, lift: &seen.lift };
     let film = lift.film(&mut RecordingFilm::new(recording), Some(&made), progress)?;
@@ -63,6 +62,7 @@ impl HeldOutFilm {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use trocar_specimen::Posterior;
 
     #[test]
     fn the_filmed_lift_is_neither_the_best_nor_the_worst() {

@@ -4,7 +4,7 @@ use super::result::{FoldRow, JudgedRow};
 use crate::Result;
 use trocar_core::Progress;
 use trocar_identify::{Grip, Identification, Lifted, LoneOrgan, Pace, SeenLift, default_priors};
-use trocar_specimen::Posterior;
+use trocar_specimen::{Parameter, Posterior};
 
 /// Cells of the mesh in which lifts are fitted (m).
 const CELL: f64 = 4e-3;
@@ -14,7 +14,7 @@ type Errors = [Option<f64>; 2];
 
 /// Identifies from the lifts whose number leaves `fold` when halved, and reproduces the others with
 /// the mesh of the specimen.
-pub(super) fn identified(
+pub(crate) fn identified(
     fold: usize,
     appendix: &LoneOrgan,
     lifts: &[(usize, SeenLift)],
@@ -57,4 +57,11 @@ pub(super) fn identified(
         judged: (0..judged.len()).map(row).collect(),
         posterior: found.posterior,
     })
+}
+
+/// The organ with the identified support and tissue.
+pub(crate) fn organ_of(fold: &FoldRow, appendix: &LoneOrgan) -> LoneOrgan {
+    let known = fold.values.iter().filter_map(|(name, value)| Some((Parameter::named(name)?, *value)));
+    let values: Vec<(Parameter, f64)> = known.collect();
+    appendix.with(|organ| Posterior::apply(&values, organ))
 }

@@ -8,6 +8,7 @@ mod page;
 mod result;
 mod support;
 
+pub(super) use identified::{identified, organ_of};
 pub use result::LiftsResult;
 
 use crate::names::SupportName;
@@ -16,7 +17,6 @@ use crate::trials::Outcomes;
 use crate::{Error, Result};
 use clap::Args;
 use glam::DVec3;
-use identified::identified;
 use result::{IdentifiedSummary, SimulatedRow, errors, residual, trend};
 use support::Support;
 use trocar_core::Progress;

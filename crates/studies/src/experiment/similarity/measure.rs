@@ -102,7 +102,7 @@ pub(super) fn measure(sides: &Sides<'_>) -> Result<(SimilarityRow, SimilarityPic
 }
 
 /// The mask grown by two pixels: the rim of an instrument is blended with its background.
-fn grown(mask: &Mask) -> Mask {
+pub(super) fn grown(mask: &Mask) -> Mask {
     let mut out = mask.clone();
     for _ in 0..2 {
         let from = out.set.clone();

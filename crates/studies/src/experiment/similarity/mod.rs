@@ -1,7 +1,8 @@
 //! Silhouettes and pictures of Table IV (paper section VII-E): reconstructions rendered through the
 //! recovered recording camera against the recordings, and through the endoscope against an oblique
-//! view.
+//! view; filmed lifts beside simulated ones.
 
+mod deforming;
 mod endoscope;
 mod fill;
 mod measure;
@@ -15,9 +16,9 @@ mod through_endoscope;
 pub use measure::SimilarityRow;
 pub use result::SimilarityResult;
 
-use crate::Result;
 use crate::names::{Recorded, phantoms_or_papers};
 use crate::study::{Job, Kind, Study};
+use crate::{Error, Result};
 use clap::Args;
 use measure::{Sides, SimilarityPictures, first_frames, labelled, measure};
 use result::PAPER;
@@ -30,8 +31,8 @@ use trocar_report::document::Document;
 use trocar_workflow::phantoms::recorded;
 use trocar_workflow::{check_interrupted, reconstruct_recording};
 
-/// Silhouettes, SSIM and PSNR of rendered reconstructions against the recordings, and oblique views
-/// through the endoscope.
+/// Silhouettes, SSIM and PSNR of rendered reconstructions against the recordings, oblique views
+/// through the endoscope, and simulated lifts beside filmed ones.
 #[derive(Clone, Debug, Args)]
 pub struct SimilarityExperiment {
     /// Phantoms; phantom-a, phantom-b and phantom-c by default. The first is also recorded from the
@@ -44,6 +45,10 @@ pub struct SimilarityExperiment {
     /// Folder of real recordings; missing ones are skipped.
     #[arg(long, value_name = "FOLDER", default_value = "../shared/data")]
     pub data: PathBuf,
+    /// Filmed lifts of phantom-a that are simulated and compared, at rest and under load; 0 for
+    /// none, else 2 or more.
+    #[arg(long, default_value_t = 4)]
+    pub lifts: usize,
     /// Paths per pixel.
     #[arg(long, default_value_t = 16)]
     pub samples: u32,
@@ -57,6 +62,10 @@ impl Study for SimilarityExperiment {
     type Figures = SimilarityResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(SimilarityResult, Document)> {
+        if self.lifts == 1 {
+            let reason = "--lifts is 1; must be 0, or 2 or more: tissue is identified from the other half";
+            return Err(Error::Mismatch(reason.to_owned()));
+        }
         job.claim()?;
         let (output, progress) = (job.output(), job.progress);
         let phantoms = phantoms_or_papers(&self.phantoms);
@@ -94,10 +103,15 @@ impl Study for SimilarityExperiment {
                 real::MUG
             ));
         }
+        let lifts = match self.lifts {
+            0 => Vec::new(),
+            lifts => deforming::deforming((lifts, self.recorded.seed, self.samples), output, progress)?,
+        };
+        let (deforming, lifted): (Vec<_>, Vec<_>) = lifts.into_iter().unzip();
         let (rows, shown): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
         let (oblique, seen_obliquely): (Vec<_>, Vec<_>) = oblique.into_iter().unzip();
-        let result = SimilarityResult { rows, oblique, skipped, paper: PAPER };
-        let document = page::document(&result, &shown, &seen_obliquely)?;
+        let result = SimilarityResult { rows, oblique, deforming, skipped, paper: PAPER };
+        let document = page::document(&result, &shown, &seen_obliquely, &lifted)?;
         Ok((result, document))
     }
 }

@@ -41,6 +41,7 @@ pub(super) enum Illumination {
 }
 
 /// Organs and surroundings in the recording frame; their colours are albedos.
+#[derive(Clone)]
 pub(super) struct Scenery {
     organs: Vec<TriMesh>,
     around: TriMesh,
@@ -57,7 +58,7 @@ impl Scenery {
             return Err(Error::Mismatch(format!("'{}' has no recording camera", made.specimen.name)));
         };
         let coarse: Vec<TriMesh> = made.specimen.organs.iter().map(|o| o.surface.clone()).collect();
-        let seen = silhouettes(&coarse, &camera)?;
+        let seen = silhouettes(&coarse, &camera, &Pose::IDENTITY)?;
         let photo = &made.composite.color;
         let total: usize = coarse.iter().map(|m| m.triangles.len()).sum();
         // Two subdivisions reduce a triangle of 1.5 mm to a pixel at 0.17 m.
@@ -88,9 +89,27 @@ impl Scenery {
         Ok(Self { organs, around, camera, illumination, power })
     }
 
+    /// The vertices of an organ (m).
+    pub fn vertices(&self, organ: usize) -> &[DVec3] {
+        &self.organs[organ].vertices
+    }
+
+    /// The scenery with the vertices of an organ at other places (m).
+    #[must_use]
+    pub fn with(&self, organ: usize, vertices: Vec<DVec3>) -> Self {
+        let mut moved = self.clone();
+        moved.organs[organ].vertices = vertices;
+        moved
+    }
+
     /// Labels of the organs through `camera` at the recording camera's pose: index + 1.
     pub fn labels(&self, camera: &Camera) -> Result<Vec<u16>> {
-        Ok(silhouettes(&self.organs, camera)?.labels)
+        self.labels_from(camera, &Pose::IDENTITY)
+    }
+
+    /// The same through `camera` at `pose`.
+    pub fn labels_from(&self, camera: &Camera, pose: &Pose) -> Result<Vec<u16>> {
+        Ok(silhouettes(&self.organs, camera, pose)?.labels)
     }
 
     /// The scene through `camera` at the recording camera's pose, in the light of the recording.
@@ -130,14 +149,14 @@ impl Scenery {
     }
 }
 
-/// The organs through the camera, without light.
-fn silhouettes(organs: &[TriMesh], camera: &Camera) -> Result<Picture> {
+/// The organs through a camera at `pose`, without light.
+pub(super) fn silhouettes(organs: &[TriMesh], camera: &Camera, pose: &Pose) -> Result<Picture> {
     let mut stage = Stage::new();
     for (k, mesh) in organs.iter().enumerate() {
         stage.add_mesh(mesh, k as u16 + 1, &Appearance::matte([150; 3]))?;
     }
     let settings = RenderSettings::Preview { shadows: false };
-    Ok(render(&mut stage, &RayGenerator::new(*camera), &Pose::IDENTITY, &settings, &Film::default()))
+    Ok(render(&mut stage, &RayGenerator::new(*camera), pose, &settings, &Film::default()))
 }
 
 /// Subdivides all triangles: halves every edge.
