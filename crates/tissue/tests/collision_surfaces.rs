@@ -168,8 +168,7 @@ fn the_force_does_not_depend_on_how_fine_the_surface_is() {
 fn resting(solver: &Solver, lower: Option<&TriMesh>, upper: Option<&TriMesh>) -> (f64, f64) {
     let (mesh, base) = slab();
     let on_top = moved(&block([4, 4, 4], 4e-3), DVec3::new(4e-3, 4e-3, 12.5e-3));
-    let mut builder =
-        ModelBuilder::new().gravity(GRAVITY).backend(solver.backend).body_contact(BodyContact::default());
+    let mut builder = ModelBuilder::new().gravity(GRAVITY).backend(solver.backend).body_contact(BodyContact::default());
     add(&mut builder, "lower", &mesh, base, lower);
     add(&mut builder, "upper", &on_top, vec![], upper);
     let model = builder.build().unwrap();

@@ -90,7 +90,11 @@ fn compare(name: &str, model: &Model, grasp: Option<Compliance>, tools: [Pose; 2
             worst = worst.max(off / largest);
         }
     }
-    println!("{name}, {} Pa: {largest:.1} N/m, differences {:.1}%", model.bodies()[0].material().young_modulus, 100.0 * worst);
+    println!(
+        "{name}, {} Pa: {largest:.1} N/m, differences {:.1}%",
+        model.bodies()[0].material().young_modulus,
+        100.0 * worst
+    );
     for i in 0..6 {
         assert!(stiffness[i][i] >= -1e-3 * largest, "{name}: diagonal {i} is {}", stiffness[i][i]);
         for j in 0..6 {
