@@ -203,6 +203,7 @@ fn a_body_rests_on_another_as_deep_with_any_surface() {
         for (name, lower, upper) in [
             ("same", Some(&same), Some(place(upper.clone()))),
             ("fine below", Some(&fine), None),
+            ("coarse below", Some(&coarse), None),
             ("fine above", None, Some(fine_upper.clone())),
             ("fine on coarse", Some(&coarse), Some(fine_upper.clone())),
         ] {
