@@ -6,8 +6,10 @@ use glam::DVec3;
 /// Spacing of the grid over the median edge of the triangles that it gives.
 const SPACING: f64 = 1.13;
 
-/// Steps and pairs of steps of the smoothing: the paper's.
-const SMOOTHING: (f64, f64, usize) = (0.5, -0.53, 10);
+/// Rounds of smoothing after which vertices go back to the surface; and the steps and pairs of
+/// steps of a round.
+const ROUNDS: usize = 3;
+const SMOOTHING: (f64, f64, usize) = (0.5, -0.53, 3);
 
 /// Most points of a grid.
 const MAX_POINTS: f64 = 3e7;
@@ -16,8 +18,8 @@ const MAX_POINTS: f64 = 3e7;
 const MIN_VOLUME: f64 = 0.7;
 
 /// A closed surface around the body that `surface` encloses, in triangles whose median edge is
-/// about `edge` (m): the largest piece of the isosurface of the signed distance, smoothed. It has
-/// no colours.
+/// about `edge` (m): the largest piece of the isosurface of the signed distance, smoothed along the
+/// surface. Its vertices lie on `surface`. It has no colours.
 ///
 /// # Errors
 /// [`Error::Mesh`] for an edge that is not above 0, so long that less than 70% of the volume is
@@ -39,7 +41,10 @@ pub fn remeshed(surface: &TriMesh, edge: f64) -> Result<TriMesh> {
     }
     let mut mesh = isosurface(&sample_distance(&field, bounds, spacing), 0.0).largest_component();
     let (lambda, mu, pairs) = SMOOTHING;
-    taubin(&mut mesh, lambda, mu, pairs);
+    for _ in 0..ROUNDS {
+        taubin(&mut mesh, lambda, mu, pairs);
+        mesh.vertices.iter_mut().for_each(|p| *p = field.closest_point(*p));
+    }
     let share = mesh.volume() / surface.volume().abs();
     if !(share >= MIN_VOLUME && mesh.is_watertight()) {
         return Err(Error::Mesh(format!(

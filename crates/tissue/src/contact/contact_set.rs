@@ -10,7 +10,7 @@ use super::feature_contacts::FeatureContacts;
 use super::force::ToolForce;
 use super::hole_vertices::HoleVertices;
 use super::local_support::LocalSupport;
-use super::site::Site;
+use super::site::{Site, add_share};
 use super::taut::LocalTether;
 use super::tool_placement::{self, Placed};
 use crate::frame::Frame;
@@ -552,14 +552,6 @@ impl ContactSet {
 
 /// Vertices with a smaller share of a contact do not bear it in sweeps, which divide by it.
 const MIN_SHARE: f32 = 1e-6;
-
-/// Adds a share of a node. Vertices of a collision surface may move with the same nodes.
-fn add_share(shares: &mut Vec<(u32, f32)>, node: u32, share: f32) {
-    match shares.iter_mut().find(|(other, _)| *other == node) {
-        Some((_, sum)) => *sum += share,
-        None => shares.push((node, share)),
-    }
-}
 
 /// Marks a vertex's first contact while they are being found.
 const MARK: u32 = 1 << 31;

@@ -10,7 +10,7 @@
 use super::contact::{Contact, Friction, Push};
 use super::coupling::Coupling;
 use super::members::Members;
-use super::site::Site;
+use super::site::{Site, add_share};
 use crate::Body;
 use crate::frame::Frame;
 use crate::state::{Source, Stretch};
@@ -78,7 +78,7 @@ pub(crate) struct Pairs {
     /// Sorted; for the sweeps.
     roles: Vec<Role>,
     /// Scratch: bodies, nodes and shares of a pair.
-    nodes: Vec<(u32, u32, f32)>,
+    nodes: Vec<((u32, u32), f32)>,
     pressed: Vec<Contact>,
 }
 
@@ -292,9 +292,11 @@ impl Pairs {
             let [own, corners @ ..] = pair.shares();
             // The vertex itself comes last.
             for (member, vertex, share) in corners.into_iter().chain([own]) {
-                island.body(member).for_nodes(vertex, share, |node, share| add_share(nodes, member, node, share));
+                island.body(member).for_nodes(vertex, share, |node, share| {
+                    add_share(nodes, (member as u32, node), share);
+                });
             }
-            for (number, (member, node, share)) in nodes.iter().enumerate() {
+            for (number, ((member, node), share)) in nodes.iter().enumerate() {
                 // A tiny share is no contact: sweeps divide by it.
                 if share.abs() > MIN_SHARE {
                     roles.push(Role { key: [*member, *node, k as u32, number as u32], share: *share });
@@ -317,13 +319,5 @@ impl Pairs {
             self.pressed.push(pair.contact.of_vertex(*node, *share, x(member, *node), pair.offset(x)));
         }
         &self.pressed
-    }
-}
-
-/// Adds a share of a node. Vertices of a collision surface may move with the same nodes.
-fn add_share(nodes: &mut Vec<(u32, u32, f32)>, member: usize, node: u32, share: f32) {
-    match nodes.iter_mut().find(|(of, other, _)| (*of as usize, *other) == (member, node)) {
-        Some((.., sum)) => *sum += share,
-        None => nodes.push((member as u32, node, share)),
     }
 }
