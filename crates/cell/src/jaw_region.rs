@@ -87,6 +87,7 @@ impl JawRegion {
         self.grasped(found)
     }
 
+    #[inline(always)]
     fn add_elements(&self, tets: &[[u32; 4]], positions: &[DVec3], found: &mut Samples) {
         for tet in tets {
             let corners = tet.map(|i| positions[i as usize]);
@@ -121,11 +122,13 @@ impl JawRegion {
 
     /// Whether no sample of an element or triangle around `middle` can be in the wedge: none is
     /// farther from there than half of the way to a corner.
-    fn is_far(&self, middle: DVec3, corners: &[DVec3]) -> bool {
-        let reach = corners.iter().map(|c| c.distance_squared(middle)).fold(0.0, f64::max).sqrt();
+    #[inline(always)]
+    fn is_far<const N: usize>(&self, middle: DVec3, corners: &[DVec3; N]) -> bool {
+        let reach = corners.map(|c| c.distance_squared(middle)).into_iter().fold(0.0, f64::max).sqrt();
         middle.distance(self.gripper.pose.translation) > self.length + BLADE_WIDTH + reach
     }
 
+    #[inline(always)]
     fn add_sample(&self, p: DVec3, share: f64, found: &mut Samples) {
         let q = self.to_gripper.transform(p);
         if self.holds(q, 0.0) {

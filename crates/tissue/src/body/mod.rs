@@ -304,10 +304,10 @@ impl Body {
     /// nodes are, and may not have followed them in `x`.
     #[inline(always)]
     pub(crate) fn place(&self, x: &[Vec3A], vertex: u32) -> Vec3A {
-        match self.bound_vertex(vertex) {
-            Some(bound) if self.lattice.is_none() => bound.sum(|node| x[node as usize]),
-            _ => x[vertex as usize],
+        if (vertex as usize) < self.internal.len() || self.lattice.is_some() {
+            return x[vertex as usize];
         }
+        self.bound[vertex as usize - self.internal.len()].sum(|node| x[node as usize])
     }
 
     /// Free nodes of the boundary (internal numbers), ascending.

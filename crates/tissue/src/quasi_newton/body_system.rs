@@ -325,6 +325,7 @@ impl QuasiNewtonSolver {
     }
 
     /// Position of a vertex (m).
+    #[inline(always)]
     pub fn at(&self, vertex: u32) -> Vec3A {
         self.iterate.at(&self.layout, vertex)
     }

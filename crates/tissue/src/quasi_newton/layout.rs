@@ -54,18 +54,21 @@ impl Layout {
     /// The value of a field at a vertex, from its values by number.
     #[inline(always)]
     pub fn value(&self, vertex: u32, field: impl Fn(usize) -> Vec3A) -> Vec3A {
-        match self.bound.get((vertex as usize).wrapping_sub(self.number.len())) {
-            None => field(self.number[vertex as usize] as usize),
-            Some(bound) => bound.sum(|number| field(number as usize)),
+        match self.number.get(vertex as usize) {
+            Some(number) => field(*number as usize),
+            None => self.bound[vertex as usize - self.number.len()].sum(|number| field(number as usize)),
         }
     }
 
     /// Calls `visit(number, share)` for the nodes that bear a `share` of something at a vertex.
     #[inline(always)]
     pub fn for_nodes(&self, vertex: u32, share: f32, mut visit: impl FnMut(usize, f32)) {
-        match self.bound.get((vertex as usize).wrapping_sub(self.number.len())) {
-            None => visit(self.number[vertex as usize] as usize, share),
-            Some(bound) => bound.shares().for_each(|(number, weight)| visit(number as usize, share * weight)),
+        match self.number.get(vertex as usize) {
+            Some(number) => visit(*number as usize, share),
+            None => {
+                let bound = &self.bound[vertex as usize - self.number.len()];
+                bound.shares().for_each(|(number, weight)| visit(number as usize, share * weight));
+            }
         }
     }
 
