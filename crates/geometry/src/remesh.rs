@@ -84,11 +84,14 @@ fn nearest(order: &[u32], place: impl Fn(u32) -> DVec3, p: DVec3) -> u32 {
         }
         across <= least
     };
-    for side in [&mut order[first..].iter() as &mut dyn Iterator<Item = &u32>, &mut order[..first].iter().rev()] {
-        while let Some(i) = side.next() {
-            if !visit(*i) {
-                break;
-            }
+    for i in &order[first..] {
+        if !visit(*i) {
+            break;
+        }
+    }
+    for i in order[..first].iter().rev() {
+        if !visit(*i) {
+            break;
         }
     }
     best
