@@ -90,10 +90,11 @@ fn an_instrument_meets_the_surface_that_the_scene_chooses() {
             still[9].arms[0].contact.length()
         };
         let plain = press(CollisionMesh::Elements);
-        for edge in [1.2, 3.0] {
+        // Coarse triangles of a thin tube are stiffer under a blade, as coarse elements are.
+        for (edge, most) in [(1.2, 0.1), (3.0, 0.3)] {
             let force = press(CollisionMesh::EdgeMm(edge));
             println!("{backend:?}: {plain:.3} N, {force:.3} N with triangles of {edge} mm");
-            assert!(plain > 0.05 && (force / plain - 1.0).abs() < 0.15, "{backend:?}, {edge} mm: {force} N, {plain} N");
+            assert!(plain > 0.05 && (force / plain - 1.0).abs() < most, "{backend:?}, {edge} mm: {force} N, {plain} N");
         }
     }
 }
