@@ -3,6 +3,9 @@
 //! The region is a wedge from 2 to 21 mm beyond the pivot, 5 mm wide, whose half-gap at distance r
 //! from the pivot is r sin(theta / 2). Tissue is grasped only if it lies in the wedge on both sides
 //! of the closing plane and the blades are farther apart than their contact skin.
+//!
+//! Tissue is the elements of an organ, and a layer under its collision surface if it has one of its
+//! own: jaws take hold of what they touch.
 
 use crate::clusters::MIN_HELD_NODES;
 use crate::gripper::{BLADE_TIP, BLADE_WIDTH, JAW_REGION_BEGIN};
@@ -40,6 +43,15 @@ pub struct TissueInJaws {
     pub gap: f64,
 }
 
+/// Tissue in the wedge so far: volume on either side of the closing plane (m3), sum of places by
+/// volume (m4), volume (m3).
+#[derive(Default)]
+struct Samples {
+    sides: [f64; 2],
+    sum: DVec3,
+    volume: f64,
+}
+
 impl JawRegion {
     /// The region of a gripper with the paper's blades.
     pub fn of(gripper: &Gripper) -> Self {
@@ -70,27 +82,64 @@ impl JawRegion {
     /// each with a fifth of the volume: nodes alone are too far apart, and nodes that touch a blade
     /// may lie on either side of its face.
     pub fn tissue(&self, tets: &[[u32; 4]], positions: &[DVec3]) -> Option<TissueInJaws> {
-        let (mut sides, mut sum, mut volume) = ([0.0; 2], DVec3::ZERO, 0.0);
+        let mut found = Samples::default();
+        self.add_elements(tets, positions, &mut found);
+        self.grasped(found)
+    }
+
+    #[inline(always)]
+    fn add_elements(&self, tets: &[[u32; 4]], positions: &[DVec3], found: &mut Samples) {
         for tet in tets {
             let corners = tet.map(|i| positions[i as usize]);
             let [a, b, c, d] = corners;
             let share = (b - a).cross(c - a).dot(d - a).abs() / 30.0;
             let middle = 0.25 * (a + b + c + d);
-            // Most elements are far away; no sample is farther from the centroid than half of the
-            // way to a corner.
-            let reach = corners.map(|c| c.distance_squared(middle)).into_iter().fold(0.0, f64::max).sqrt();
-            if middle.distance(self.gripper.pose.translation) > self.length + BLADE_WIDTH + reach {
+            if self.is_far(middle, &corners) {
                 continue;
             }
             for p in corners.map(|c| middle.lerp(c, TOWARDS_CORNER)).into_iter().chain([middle]) {
-                let q = self.to_gripper.transform(p);
-                if self.holds(q, 0.0) {
-                    sides[usize::from(q.y > 0.0)] += share;
-                    sum += share * p;
-                    volume += share;
-                }
+                self.add_sample(p, share, found);
             }
         }
+    }
+
+    /// Adds a layer of `depth` (m) under triangles with vertices at `positions` (m, world), sampled
+    /// at four points each.
+    fn add_layer(&self, triangles: &[[u32; 3]], positions: &[DVec3], depth: f64, found: &mut Samples) {
+        for triangle in triangles {
+            let corners = triangle.map(|i| positions[i as usize]);
+            let [a, b, c] = corners;
+            let share = depth * (b - a).cross(c - a).length() / 8.0;
+            let middle = (a + b + c) / 3.0;
+            if self.is_far(middle, &corners) {
+                continue;
+            }
+            for p in corners.map(|c| middle.lerp(c, TOWARDS_CORNER)).into_iter().chain([middle]) {
+                self.add_sample(p, share, found);
+            }
+        }
+    }
+
+    /// Whether no sample of an element or triangle around `middle` can be in the wedge: none is
+    /// farther from there than half of the way to a corner.
+    #[inline(always)]
+    fn is_far<const N: usize>(&self, middle: DVec3, corners: &[DVec3; N]) -> bool {
+        let reach = corners.map(|c| c.distance_squared(middle)).into_iter().fold(0.0, f64::max).sqrt();
+        middle.distance(self.gripper.pose.translation) > self.length + BLADE_WIDTH + reach
+    }
+
+    #[inline(always)]
+    fn add_sample(&self, p: DVec3, share: f64, found: &mut Samples) {
+        let q = self.to_gripper.transform(p);
+        if self.holds(q, 0.0) {
+            found.sides[usize::from(q.y > 0.0)] += share;
+            found.sum += share * p;
+            found.volume += share;
+        }
+    }
+
+    /// What is grasped of the samples in the wedge.
+    fn grasped(&self, Samples { sides, sum, volume }: Samples) -> Option<TissueInJaws> {
         if sides.contains(&0.0) {
             return None;
         }
@@ -102,7 +151,14 @@ impl JawRegion {
 
     /// Tissue of organ `organ` between the blades, as [`tissue`](Self::tissue).
     pub fn tissue_of(&self, world: &World, organ: usize) -> Option<TissueInJaws> {
-        self.tissue(world.model.bodies()[organ].tets(), &world.state.positions(&world.model, organ))
+        let body = &world.model.bodies()[organ];
+        let mut found = Samples::default();
+        self.add_elements(body.tets(), &world.state.positions(&world.model, organ), &mut found);
+        if let Some(surface) = body.collision_surface() {
+            let positions = world.state.collision_positions(&world.model, organ);
+            self.add_layer(&surface.mesh().triangles, &positions, 0.5 * body.median_edge(), &mut found);
+        }
+        self.grasped(found)
     }
 
     /// The organ with the most tissue between the blades, and that tissue.
@@ -122,7 +178,8 @@ impl JawRegion {
         (0..body.len()).any(|i| place(i).distance_squared(self.gripper.pose.translation) < reach * reach)
     }
 
-    /// Nodes of organ `organ` between the blades, or within half of a median edge of them.
+    /// Nodes of organ `organ` between the blades, or within half of a median edge of them; and
+    /// those that move a vertex of its collision surface there.
     pub fn nodes_of(&self, world: &World, organ: usize) -> Vec<u32> {
         let body = &world.model.bodies()[organ];
         let beyond = 0.5 * body.median_edge();
@@ -130,7 +187,17 @@ impl JawRegion {
             let p = world.state.position(&world.model, organ, *i as usize);
             self.holds(self.to_gripper.transform(p), beyond)
         };
-        (0..body.len() as u32).filter(inside).collect()
+        let mut nodes: Vec<u32> = (0..body.len() as u32).filter(inside).collect();
+        if let Some(surface) = body.collision_surface() {
+            let vertices = world.state.collision_positions(&world.model, organ).into_iter().enumerate();
+            for (vertex, _) in vertices.filter(|(_, p)| self.holds(self.to_gripper.transform(*p), beyond)) {
+                let (of, weights) = surface.nodes_of(vertex);
+                nodes.extend(of.iter().zip(weights).filter(|(_, weight)| *weight > 0.0).map(|(node, _)| *node));
+            }
+            nodes.sort_unstable();
+            nodes.dedup();
+        }
+        nodes
     }
 }
 

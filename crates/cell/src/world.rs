@@ -3,7 +3,7 @@
 use crate::mesh_correction::element_material;
 use crate::{Error, Result};
 use glam::DVec3;
-use trocar_geometry::{OrganAxis, TetQuality};
+use trocar_geometry::{OrganAxis, TetQuality, TriMesh};
 use trocar_scene::TOUGHNESS;
 use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen, Threads};
 use trocar_tissue::{
@@ -69,6 +69,9 @@ pub struct Surroundings {
     pub mesh_correction: bool,
     /// Toughness of organs (J/m2), by their indices; [`TOUGHNESS`] of those that are left out.
     pub toughness: Vec<f64>,
+    /// Collision surfaces of organs (m), by their indices; None, or left out: the boundary of the
+    /// elements.
+    pub collision: Vec<Option<TriMesh>>,
 }
 
 impl Default for Surroundings {
@@ -83,6 +86,7 @@ impl Default for Surroundings {
             floating: Vec::new(),
             mesh_correction: true,
             toughness: Vec::new(),
+            collision: Vec::new(),
         }
     }
 }
@@ -155,6 +159,9 @@ impl World {
                 supports: bed.map(|friction| support_under(organ, up, friction)).transpose()?.into_iter().collect(),
             })?;
             builder.tethers(k, &tethers_of(organ, &axis, up))?;
+            if let Some(Some(surface)) = surroundings.collision.get(k) {
+                builder.collision_surface(k, surface)?;
+            }
             axes.push(axis);
         }
         for [a, b] in &surroundings.filtered {

@@ -32,6 +32,7 @@ mod grid;
 mod isosurface;
 pub mod mesher;
 mod quality;
+mod remesh;
 mod repair;
 mod segments;
 #[cfg(test)]
@@ -51,6 +52,7 @@ pub use grid::{Grid, sample_distance, sample_everywhere};
 pub use isosurface::isosurface;
 pub use mesher::{LatticeMesher, Mesher, TetgenMesher};
 pub use quality::TetQuality;
+pub use remesh::remeshed;
 pub use repair::{RepairReport, repair};
 pub use segments::nearest_of_segments;
 pub use skin::Skin;

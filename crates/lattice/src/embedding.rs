@@ -75,8 +75,9 @@ impl Lattice {
         Ok(points.par_iter().map(embed).collect())
     }
 
-    /// Embeds points (m) inside given elements.
-    pub(crate) fn embed_in(&self, points: &[(u32, DVec3)]) -> Vec<EmbeddedPoint> {
+    /// Embeds points (m), each with the element of the mesh that it moves with. A point may lie
+    /// outside of its element.
+    pub fn embed_in(&self, points: &[(u32, DVec3)]) -> Vec<EmbeddedPoint> {
         let search = Search::new(self);
         let embed = |(tet, p): &(u32, DVec3)| self.at(search.hexahedron(*tet, *p), *p);
         points.par_iter().map(embed).collect()

@@ -1,6 +1,7 @@
 //! The organs of a scene: where they come from, and what is said otherwise than in the specimen.
 
 use crate::Phantom;
+use crate::surfaces::Surfaces;
 use crate::tissue_preset::TissuePreset;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
@@ -147,6 +148,9 @@ pub struct OrganOverride {
     /// Threads that hold it besides; the specimen's if left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threads: Option<ThreadRule>,
+    /// What of it touches, and what of it pictures show.
+    #[serde(skip_serializing_if = "Surfaces::is_default")]
+    pub surfaces: Surfaces,
 }
 
 /// Parts of a material that differ from the specimen's.

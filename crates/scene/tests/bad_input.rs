@@ -297,6 +297,11 @@ fn numbers() {
             "up = [0.0, 0.0, 1.0]§",
             "camera[1].view.up is zero or parallel to the view; it must be the direction of the image's top",
         ),
+        Case(
+            "[organ.cecum.pins]",
+            "[organ.cecum.surfaces]\ncollision = { edge_mm = 0.003§ }\n[organ.cecum.pins]",
+            "organ.cecum.surfaces.collision.edge_mm is 0.003; it must be in [0.2, 50] mm; 0.003 m is 3 mm",
+        ),
         Case("share = 0.42", "share = 42§", "organ.cecum.pins.share is 42; it must be in [0, 1]"),
         Case(
             "length = 0.14",
@@ -343,6 +348,26 @@ fn names() {
             "phantom = \"phantom-a\" ",
             "path = \"nowhere\"§ ",
             "specimen.path is nowhere, which is no specimen; it must be a folder with a specimen.toml",
+        ),
+        Case(
+            "[organ.cecum.pins]",
+            "[organ.cecum.surfaces]\ncollision = \"element§\"\n[organ.cecum.pins]",
+            "organ.cecum.surfaces.collision: unknown variant `element`, expected one of `elements`, `edge_mm`, `file`; did you mean `elements`?",
+        ),
+        Case(
+            "[organ.cecum.pins]",
+            "[organ.cecum.surfaces]\nrender = { edge_mm = 3.0§ }\n[organ.cecum.pins]",
+            "organ.cecum.surfaces.render: unknown variant `edge_mm`, expected one of `skin`, `elements`, `collision`, `file`",
+        ),
+        Case(
+            "[organ.cecum.pins]",
+            "[organ.cecum.surfaces]\ncollision = { file = \"cecum.step§\" }\n[organ.cecum.pins]",
+            "organ.cecum.surfaces.collision.file is 'cecum.step'; it must be a file that ends in .ply, .stl or .obj",
+        ),
+        Case(
+            "[organ.cecum.pins]",
+            "[organ.cecum.surfaces]\nrender = { file = \"none.ply§\" }\n[organ.cecum.pins]",
+            "organ.cecum.surfaces.render.file is none.ply, which is no file; it must be a path from the scene file's folder",
         ),
         Case(
             "[organ.cecum.pins]",

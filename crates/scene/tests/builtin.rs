@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use trocar_phantom::RecordOptions;
-use trocar_scene::{BUILTINS, PHANTOMS, Scene, SpecimenSource, Variation};
+use trocar_scene::{BUILTINS, CollisionMesh, PHANTOMS, RenderMesh, Scene, SpecimenSource, Surfaces, Variation};
 
 #[test]
 fn cell_a_writes_out_the_defaults() {
@@ -26,6 +26,25 @@ fn every_scene_comes_back_from_its_canonical_form() {
         assert_eq!(again.to_toml().unwrap(), text);
         assert_eq!(Scene::read(builtin.name).unwrap(), scene);
         scene.validate().unwrap();
+    }
+}
+
+/// What is said of surfaces comes back, and a scene that says nothing is written as before.
+#[test]
+fn surfaces_come_back_from_the_canonical_form() {
+    let minimal = "name = 'a'\n[specimen]\nphantom = 'phantom-a'\n";
+    let plain = Scene::parse(minimal, "a", "".as_ref()).unwrap();
+    assert!(!plain.to_toml().unwrap().contains("surfaces"));
+    for (said, collision, render) in [
+        ("collision = 'elements'\nrender = 'skin'", CollisionMesh::Elements, RenderMesh::Skin),
+        ("collision = { edge_mm = 3 }", CollisionMesh::EdgeMm(3.0), RenderMesh::Skin),
+        ("collision = { edge_mm = 3.5 }\nrender = 'collision'", CollisionMesh::EdgeMm(3.5), RenderMesh::Collision),
+        ("render = 'elements'", CollisionMesh::Elements, RenderMesh::Elements),
+    ] {
+        let scene = Scene::parse(&format!("{minimal}[organ.cecum.surfaces]\n{said}"), "a", "".as_ref()).unwrap();
+        assert_eq!(scene.organs["cecum"].surfaces, Surfaces { collision, render });
+        let canonical = scene.to_toml().unwrap();
+        assert_eq!(Scene::parse(&canonical, "a", "".as_ref()).unwrap(), scene, "{canonical}");
     }
 }
 

@@ -27,6 +27,9 @@ fn scenes_validate() {
         "name = 'a'\n[specimen]\nphantom = 'phantom-a'\n[rates]\ncontrol_hz = 'fast'",
         "name = 'a'\n[specimen]\nphantom = 'phantom-a'\n[organ.cecum.material]\nmodel = 'rubber'",
         "name = 'a'\n[specimen]\nphantom = 'phantom-a'\n[organ.cecum.pins]\nrule = 'band'",
+        "name = 'a'\n[specimen]\nphantom = 'phantom-a'\n[organ.cecum.surfaces]\ncollision = 'skin'",
+        "name = 'a'\n[specimen]\nphantom = 'phantom-a'\n[organ.cecum.surfaces]\ncollision = { edge_mm = 99 }",
+        "name = 'a'\n[specimen]\nphantom = 'phantom-a'\n[organ.cecum.surfaces]\nrender = { edge_mm = 3 }",
     ] {
         assert!(!validator.is_valid(&instance(bad)), "{bad}");
         assert!(Scene::parse(bad, "bad", "".as_ref()).is_err(), "{bad}");

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
 use trocar_cell::{Action, ActionSpace};
-use trocar_scene::{ArmModel, Drawn, Scene, Source, Variation};
+use trocar_scene::{ArmModel, CollisionMesh, Drawn, Scene, Source, Variation};
 use trocar_specimen::{Specimen, parse_toml};
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -103,15 +103,22 @@ pub struct Verdict {
     pub replayed_by: String,
 }
 
-/// The hash by which replays identify a scene: [`Scene::hash`] over the specimen's hash and the
-/// arms' model files.
+/// The hash by which replays identify a scene: [`Scene::hash`] over the specimen's hash, the arms'
+/// model files and the organs' collision surfaces.
 ///
 /// # Errors
-/// A model file that cannot be read.
+/// A file that cannot be read.
 pub fn scene_hash(scene: &Scene, specimen: u64) -> Result<u64> {
     let mut contents = vec![specimen];
     for arm in &scene.arms {
         if let Some(ArmModel::Urdf(file) | ArmModel::Mjcf(file)) = arm.source() {
+            let path = scene.resolve(file);
+            let bytes = std::fs::read(&path).map_err(|source| Error::Io { path, source })?;
+            contents.push(xxh3_64(&bytes));
+        }
+    }
+    for organ in scene.organs.values() {
+        if let CollisionMesh::File(file) = &organ.surfaces.collision {
             let path = scene.resolve(file);
             let bytes = std::fs::read(&path).map_err(|source| Error::Io { path, source })?;
             contents.push(xxh3_64(&bytes));

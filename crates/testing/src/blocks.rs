@@ -2,7 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::missing_panics_doc, reason = "helpers of tests may panic")]
 
 use glam::DVec3;
-use trocar_geometry::{LatticeMesher, SignedDistance, TetMesh};
+use std::collections::BTreeMap;
+use trocar_geometry::{LatticeMesher, SignedDistance, TetMesh, TriMesh};
 use trocar_tissue::{
     BodyDescription, ConstitutiveModel, Descent, Material, Model, ModelBuilder, SolverSettings, Start, SupportField,
     SupportPlane,
@@ -136,4 +137,21 @@ pub fn three_bodies() -> (Model, Vec<u32>) {
         builder.body(body).unwrap();
     }
     (builder.build().unwrap(), nodes(&large, |p| p.z > 7e-3 && p.x < 3e-3))
+}
+
+/// The same surface with each triangle in four.
+pub fn refined(surface: &TriMesh) -> TriMesh {
+    let mut fine = TriMesh { vertices: surface.vertices.clone(), ..TriMesh::default() };
+    let mut middles = BTreeMap::new();
+    let mut middle = |a: u32, b: u32| {
+        *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+            fine.vertices.push(0.5 * (surface.vertices[a as usize] + surface.vertices[b as usize]));
+            fine.vertices.len() as u32 - 1
+        })
+    };
+    for [a, b, c] in &surface.triangles {
+        let [ab, bc, ca] = [middle(*a, *b), middle(*b, *c), middle(*c, *a)];
+        fine.triangles.extend([[*a, ab, ca], [*b, bc, ab], [*c, ca, bc], [ab, bc, ca]]);
+    }
+    fine
 }

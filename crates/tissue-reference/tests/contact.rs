@@ -177,3 +177,24 @@ fn a_body_on_another_meets_the_oracles_force() {
         assert!(error < 0.02 && field < 0.02, "force off by {error}, field by {field}");
     }
 }
+
+/// The oracle judges contact of the elements' boundary, and says so.
+#[test]
+fn another_surface_is_refused() {
+    let mesh = cuboid([24e-3, 24e-3, TOP], 4e-3);
+    let mut builder = ModelBuilder::new();
+    builder
+        .body(BodyDescription {
+            name: "layer".into(),
+            mesh: &mesh,
+            material: material(),
+            pinned: vec![],
+            supports: vec![],
+        })
+        .unwrap();
+    builder.collision_surface(0, &mesh.boundary().0).unwrap();
+    let model = builder.build().unwrap();
+    let (mut oracle, mut exact) = (Oracle::new(&model), OracleState::new(&model));
+    let message = oracle.step(&model, &mut exact, FRAME, &[]).unwrap_err().to_string();
+    assert!(message.contains("body 'layer' has a collision surface of its own"), "{message}");
+}

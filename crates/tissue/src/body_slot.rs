@@ -140,8 +140,17 @@ impl<S: Solver> BodySlot<S> {
         self.report = StepReport::default();
         self.before.copy_from(state);
         // Tetrahedra in a lattice bear nothing.
-        if self.body.lattice.is_none() {
-            self.untangler.untangle(&frame.of(self.index), &self.body, state);
+        match (&self.body.lattice, &mut state.lattice) {
+            (None, _) => {
+                self.untangler.untangle(&frame.of(self.index), &self.body, state);
+                state.follow_nodes(&self.body);
+            }
+            // A collision surface is where contact between bodies is looked for before they are
+            // solved.
+            (Some(embedding), Some(lattice)) if !self.body.bound.is_empty() => {
+                embedding.follow(lattice, &mut state.x, &mut state.v);
+            }
+            _ => {}
         }
     }
 

@@ -1,6 +1,7 @@
 //! Builds models. Every error of a model is found here.
 
 mod check;
+mod collision;
 mod embed;
 
 use crate::assembly::{SEEN_FROM, shape_gradients};
@@ -16,7 +17,7 @@ use crate::{
 };
 pub(crate) use embed::embed;
 use glam::{DVec3, Vec3A};
-use trocar_geometry::{TetMesh, TetQuality};
+use trocar_geometry::{TetMesh, TetQuality, TriMesh};
 
 /// One body to add.
 #[derive(Clone, Debug)]
@@ -218,6 +219,30 @@ impl ModelBuilder {
         Ok(())
     }
 
+    /// Lets the body at `index` touch tools and other bodies with `surface` (m) in the place of the
+    /// boundary of its elements. It is bound to the elements as it lies in the rest shape. Supports,
+    /// threads and grasps still act on nodes. Stiffness is by area that of the boundary, so a force
+    /// does not depend on how fine the surface is. A cut body touches with its boundary
+    /// ([`crate::sever`]).
+    ///
+    /// # Errors
+    /// The error names the body. Refused are bodies that have not been added, and surfaces without
+    /// triangles, with numbers that are not finite or vertices that there are not, that are open,
+    /// face inward, enclose less than half or more than twice the volume of the elements, or have a
+    /// vertex farther from the elements than the body's median edge.
+    pub fn collision_surface(&mut self, index: usize, surface: &TriMesh) -> Result<()> {
+        let bodies = self.bodies.len();
+        let Some(body) = self.bodies.get_mut(index) else {
+            return Err(Error::Model(format!(
+                "body {index} is to have a collision surface; there are {bodies} so far"
+            )));
+        };
+        collision::bind(body, surface).map_err(|reason| Error::Body {
+            body: body.name.clone(),
+            reason: format!("its collision surface {reason}"),
+        })
+    }
+
     /// Makes the bodies touch each other, except for filtered pairs. Without it they pass through
     /// each other. Integrators from outside this crate ([`crate::Integrator`]) ignore it.
     pub fn body_contact(mut self, contact: BodyContact) -> Self {
@@ -364,6 +389,7 @@ pub(crate) fn lay_out(description: BodyDescription<'_>, contact_stiffness: f64, 
         }
     };
 
+    let (surface, areas) = Surface::of(mesh, &internal);
     let mut body = BodyData {
         material,
         supports,
@@ -375,7 +401,11 @@ pub(crate) fn lay_out(description: BodyDescription<'_>, contact_stiffness: f64, 
         pinned,
         median_edge: TetQuality::of(mesh).median_edge,
         origin,
-        surface: Surface::of(mesh, &internal),
+        areas,
+        surface,
+        collision: None,
+        bound: Vec::new(),
+        bound_stiffness: Vec::new(),
         internal,
         color_start,
         tets: Vec::new(),

@@ -98,7 +98,9 @@ impl<S: Solver> Island<S> {
             for contact in contacts.iter().filter(|contact| matches!(contact.source, Source::Collider(_))) {
                 if let Some(push) = contact.push(contact.site.at(|vertex| x(m, vertex))) {
                     for (vertex, share) in contact.site.shares() {
-                        visit(slot.index, vertex, (-share * push.gradient).as_dvec3());
+                        slot.body.for_nodes(vertex, share, |node, share| {
+                            visit(slot.index, node, (-share * push.gradient).as_dvec3());
+                        });
                     }
                 }
             }
@@ -106,7 +108,9 @@ impl<S: Solver> Island<S> {
         for pair in self.pairs.list() {
             if let Some(push) = pair.contact.push(pair.offset(x)) {
                 for (m, vertex, share) in pair.shares() {
-                    visit(slots[m].index, vertex, (-share * push.gradient).as_dvec3());
+                    slots[m].body.for_nodes(vertex, share, |node, share| {
+                        visit(slots[m].index, node, (-share * push.gradient).as_dvec3());
+                    });
                 }
             }
         }
@@ -119,8 +123,10 @@ pub(crate) fn press_tools<S: Solver>(slots: &mut [BodySlot<S>], pairs: &Pairs, f
         if let Some(push) = pair.contact.push(pair.offset(|m, vertex| slots.x(m, vertex))) {
             for (m, vertex, share) in pair.shares() {
                 let BodySlot { body, state, reaction, .. } = &mut slots[m];
-                let force = (-share * push.gradient).as_dvec3();
-                reaction.press(frame, body, state, vertex as usize, force);
+                body.for_nodes(vertex, share, |node, share| {
+                    let force = (-share * push.gradient).as_dvec3();
+                    reaction.press(frame, body, state, node as usize, force);
+                });
             }
         }
     }

@@ -83,7 +83,7 @@ pub use backend::{Backend, LatticeSettings, Law};
 #[cfg(feature = "gpu")]
 pub use batch::GpuBatch;
 pub use batch::{Batch, BatchSettings, Instance, InstanceReport};
-pub use body::Body;
+pub use body::{Body, CollisionSurface};
 pub use builder::{BodyDescription, MassFloor, ModelBuilder};
 pub use contact::{Event, ToolForce};
 pub use contact_model::{BodyContact, Collider, Hull, Nearest, Shape, ToolContact};

@@ -144,7 +144,7 @@ impl StepReport {
             self.divergence = Some(Divergence::NonFinite { body: index });
             return;
         }
-        self.max_speed = f64::from(state.v.iter().map(|v| v.length_squared()).fold(0.0, f32::max)).sqrt();
+        self.max_speed = f64::from(state.v[..body.len()].iter().map(|v| v.length_squared()).fold(0.0, f32::max)).sqrt();
         let mut count = |ratio: f64| {
             self.inverted += usize::from(ratio <= 0.0);
             self.min_volume_ratio = self.min_volume_ratio.min(ratio);
@@ -158,7 +158,7 @@ impl StepReport {
                 count(f64::from((b - a).cross(c - a).dot(d - a)) / 6.0 / rest);
             }
         }
-        let stretched = (0..state.x.len()).any(|i| {
+        let stretched = (0..body.len()).any(|i| {
             let too_long = |length: f32, j: u32| {
                 (state.x[j as usize] - state.x[i]).length_squared() > (STRETCH_LIMIT * length).powi(2)
             };

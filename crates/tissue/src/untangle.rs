@@ -49,9 +49,10 @@ impl Untangler {
         for grasp in frame.grasps() {
             grasp.nodes.iter().for_each(|i| self.fixed[body.internal[*i as usize] as usize] = true);
         }
-        let turn = self.rotation(body, &state.x);
+        let turn = self.rotation(body, &state.x[..body.len()]);
+        let nodes = body.len();
         for _ in 0..MAX_CHECKS {
-            (0..SWEEPS_PER_CHECK).for_each(|_| self.sweep(body, turn, &mut state.x));
+            (0..SWEEPS_PER_CHECK).for_each(|_| self.sweep(body, turn, &mut state.x[..nodes]));
             if least_ratio(body, &state.x) > REPAIRED_VOLUME_RATIO {
                 break;
             }

@@ -1,42 +1,64 @@
-//! The contract of a tissue backend: the same suite for each of them. A new backend is a line in
-//! [`backends`].
+//! The contract of a tissue backend: the same suite for each of them, with bodies that touch with
+//! the boundary of their elements, and with ones that have a finer collision surface. A new backend
+//! is a line in [`backends`].
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and print figures")]
 
 use glam::{DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
-use trocar_testing::blocks::{FRAME, GRAVITY, block, nodes, tissue};
+use trocar_testing::blocks::{FRAME, GRAVITY, block, nodes, refined, tissue};
 use trocar_tissue::{
     Backend, BodyContact, BodyDescription, Collider, Compliance, Cut, Grasp, LatticeSettings, Law, Material, Model,
     ModelBuilder, Shape, SolverSettings, State, Stepper, SupportPlane, ToolContact, ToolMotion, sever,
 };
 
+/// What the suite runs on.
+#[derive(Clone, Copy)]
+struct Case {
+    backend: Backend,
+    /// Whether bodies have a collision surface of their own, in triangles of a quarter.
+    fine: bool,
+}
+
+impl Case {
+    fn add(self, builder: &mut ModelBuilder, body: BodyDescription<'_>) -> trocar_tissue::Result<()> {
+        let mesh = body.mesh;
+        let index = builder.body(body)?;
+        if self.fine { builder.collision_surface(index, &refined(&mesh.boundary().0)) } else { Ok(()) }
+    }
+}
+
 /// Every backend, with its name.
-fn backends() -> [(&'static str, Backend); 3] {
+fn backends() -> [(&'static str, Case); 5] {
     let lattice = |law| Backend::Lattice(LatticeSettings { cell: 3e-3, law });
+    let of = |backend| Case { backend, fine: false };
+    let fine = |backend| Case { backend, fine: true };
     [
-        ("tetrahedra", Backend::Tetrahedra),
-        ("corotated lattice", lattice(Law::Corotated)),
-        ("neo-Hookean lattice", lattice(Law::StableNeoHookean)),
+        ("tetrahedra", of(Backend::Tetrahedra)),
+        ("corotated lattice", of(lattice(Law::Corotated))),
+        ("neo-Hookean lattice", of(lattice(Law::StableNeoHookean))),
+        ("tetrahedra, fine surface", fine(Backend::Tetrahedra)),
+        ("neo-Hookean lattice, fine surface", fine(lattice(Law::StableNeoHookean))),
     ]
 }
 
 /// Bodies under gravity.
 struct Scene<'a> {
     builder: ModelBuilder,
+    case: Case,
     mesh: &'a TetMesh,
 }
 
 impl<'a> Scene<'a> {
-    fn new(backend: Backend, mesh: &'a TetMesh) -> Self {
-        Self { builder: ModelBuilder::new().gravity(GRAVITY).backend(backend), mesh }
+    fn new(case: Case, mesh: &'a TetMesh) -> Self {
+        Self { builder: ModelBuilder::new().gravity(GRAVITY).backend(case.backend), case, mesh }
     }
 
     fn body(mut self, material: Material, pinned: Vec<u32>, supports: Vec<SupportPlane>) -> Self {
         let supports = supports.into_iter().map(Into::into).collect();
         let (name, mesh) = ("body".to_owned(), self.mesh);
-        self.builder.body(BodyDescription { name, mesh, material, pinned, supports }).unwrap();
+        self.case.add(&mut self.builder, BodyDescription { name, mesh, material, pinned, supports }).unwrap();
         self
     }
 
@@ -77,8 +99,8 @@ fn mean(model: &Model, state: &State, body: usize) -> DVec3 {
 #[test]
 fn a_free_body_falls() {
     let mesh = block([4, 4, 4], 4e-3);
-    for (name, backend) in backends() {
-        let model = Scene::new(backend, &mesh).body(viscous(12e3), vec![], vec![]).build();
+    for (name, case) in backends() {
+        let model = Scene::new(case, &mesh).body(viscous(12e3), vec![], vec![]).build();
         let (mut state, mut stepper) = (State::new(&model), stepper(&model, 1));
         let start = mean(&model, &state, 0);
         for _ in 0..60 {
@@ -98,11 +120,11 @@ fn a_free_body_falls() {
 #[test]
 fn momentum_is_kept() {
     let mesh = block([4, 3, 3], 4e-3);
-    for (name, backend) in backends() {
-        let mut builder = ModelBuilder::new().backend(backend);
+    for (name, case) in backends() {
+        let mut builder = ModelBuilder::new().backend(case.backend);
         let material = viscous(12e3);
         let body = BodyDescription { name: "body".into(), mesh: &mesh, material, pinned: vec![], supports: vec![] };
-        builder.body(body).unwrap();
+        case.add(&mut builder, body).unwrap();
         let model = builder.build().unwrap();
         let (mut state, mut stepper) = (State::new(&model), stepper(&model, 1));
         let centre = mean(&model, &state, 0);
@@ -127,11 +149,11 @@ fn momentum_is_kept() {
 #[test]
 fn a_column_sags_under_its_weight() {
     let mesh = block([2, 2, 10], 4e-3);
-    for (name, backend) in backends() {
+    for (name, case) in backends() {
         let material = Material { poisson_ratio: 0.0, ..viscous(12e3) };
         let length = 40e-3;
         let top = nodes(&mesh, |p| p.z > length - 1e-6);
-        let model = Scene::new(backend, &mesh).body(material, top.clone(), vec![]).build();
+        let model = Scene::new(case, &mesh).body(material, top.clone(), vec![]).build();
         let (mut state, mut stepper) = (State::new(&model), stepper(&model, 1));
         run(&mut stepper, &model, &mut state, &[], 90);
         let base = nodes(&mesh, |p| p.z < 1e-6);
@@ -164,10 +186,10 @@ fn jaws(jaw_force: f64) -> Compliance {
 #[test]
 fn grasps_hold_without_snap_or_drift() {
     let mesh = strip();
-    for (name, backend) in backends() {
+    for (name, case) in backends() {
         for compliance in [None, Some(jaws(5.0))] {
             let base = nodes(&mesh, |p| p.x < 1e-6);
-            let model = Scene::new(backend, &mesh).body(viscous(12e3), base, vec![]).build();
+            let model = Scene::new(case, &mesh).body(viscous(12e3), base, vec![]).build();
             let (mut state, mut stepper) = (State::new(&model), stepper(&model, 1));
             for _ in 0..60 {
                 stepper.step(&model, &mut state, &[]);
@@ -220,9 +242,9 @@ fn grasps_hold_without_snap_or_drift() {
 #[test]
 fn grasps_slip_at_coulombs_limit() {
     let mesh = strip();
-    for (name, backend) in backends() {
+    for (name, case) in backends() {
         for share in [0.9, 1.1] {
-            let model = Scene::new(backend, &mesh).body(viscous(12e3), vec![], vec![]).build();
+            let model = Scene::new(case, &mesh).body(viscous(12e3), vec![], vec![]).build();
             let (mut state, mut stepper) = (State::new(&model), stepper(&model, 1));
             let weight = 1200.0 * 9.81 * mesh.volume();
             let tip = nodes(&mesh, |p| p.x < 9.1e-3);
@@ -247,13 +269,13 @@ fn grasps_slip_at_coulombs_limit() {
 #[test]
 fn friction_holds_up_to_its_angle() {
     let mesh = block([4, 4, 2], 4e-3);
-    for (name, backend) in backends() {
+    for (name, case) in backends() {
         for (slope, slides) in [(0.45, false), (0.75, true)] {
             let normal = DVec3::new(-f64::sin(f64::atan(slope)), 0.0, f64::cos(f64::atan(slope)));
             let turn = DQuat::from_rotation_arc(DVec3::Z, normal);
             let turned = TetMesh { vertices: mesh.vertices.iter().map(|p| turn * *p).collect(), ..mesh.clone() };
             let plane = SupportPlane { point: DVec3::ZERO, normal, friction: 0.6 };
-            let model = Scene::new(backend, &turned).body(viscous(12e3), vec![], vec![plane]).build();
+            let model = Scene::new(case, &turned).body(viscous(12e3), vec![], vec![plane]).build();
             let (mut state, mut stepper) = (State::new(&model), stepper(&model, 1));
             run(&mut stepper, &model, &mut state, &[], 90);
             let before = mean(&model, &state, 0);
@@ -267,13 +289,14 @@ fn friction_holds_up_to_its_angle() {
 }
 
 /// Two bodies, one on the other on a floor, a tool that presses the upper one, and a grasp.
-fn busy(backend: Backend, mesh: &TetMesh) -> (Model, State) {
+fn busy(case: Case, mesh: &TetMesh) -> (Model, State) {
     let upper = TetMesh { vertices: mesh.vertices.iter().map(|p| *p + 14e-3 * DVec3::Z).collect(), ..mesh.clone() };
     let floor = SupportPlane { point: DVec3::ZERO, normal: DVec3::Z, friction: 0.6 };
-    let mut builder = ModelBuilder::new().gravity(GRAVITY).backend(backend).body_contact(BodyContact::default());
+    let mut builder = ModelBuilder::new().gravity(GRAVITY).backend(case.backend).body_contact(BodyContact::default());
     for (name, mesh) in [("lower", mesh), ("upper", &upper)] {
         let (name, material) = (name.to_owned(), viscous(12e3));
-        builder.body(BodyDescription { name, mesh, material, pinned: vec![], supports: vec![floor.into()] }).unwrap();
+        let supports = vec![floor.into()];
+        case.add(&mut builder, BodyDescription { name, mesh, material, pinned: vec![], supports }).unwrap();
     }
     let shape = Shape::Sphere { centre: DVec3::ZERO, radius: 4e-3 };
     builder.collider(Collider { name: "tip".into(), tool: 0, shape, rest_offset: 1.5e-3, friction: 0.4 }).unwrap();
@@ -297,8 +320,8 @@ fn tools(frame: usize) -> [ToolMotion; 2] {
 #[test]
 fn contact_bears_and_states_restore() {
     let mesh = block([4, 4, 3], 4e-3);
-    for (name, backend) in backends() {
-        let (model, start) = busy(backend, &mesh);
+    for (name, case) in backends() {
+        let (model, start) = busy(case, &mesh);
         let run = |threads: usize| {
             let (mut state, mut stepper) = (start.clone(), stepper(&model, threads));
             let mut saved = None;
@@ -334,9 +357,9 @@ fn contact_bears_and_states_restore() {
 #[test]
 fn a_cut_parts_tissue_where_it_is() {
     let mesh = strip();
-    for (name, backend) in backends() {
+    for (name, case) in backends() {
         let base = nodes(&mesh, |p| p.x < 1e-6);
-        let model = Scene::new(backend, &mesh).body(viscous(12e3), base, vec![]).build();
+        let model = Scene::new(case, &mesh).body(viscous(12e3), base, vec![]).build();
         let (mut state, mut stepper) = (State::new(&model), stepper(&model, 1));
         run(&mut stepper, &model, &mut state, &[], 60);
         let middle = state.centroid(&model, 0, &nodes(&mesh, |p| (p.x - 15e-3).abs() < 1e-6));
@@ -369,25 +392,25 @@ fn a_cut_parts_tissue_where_it_is() {
 #[test]
 fn bad_input_is_refused() {
     let mesh = block([4, 4, 3], 4e-3);
-    for (name, backend) in backends() {
+    for (name, case) in backends() {
         let build = |backend: Backend, mesh: &TetMesh| {
             let mut builder = ModelBuilder::new().backend(backend);
             let material = tissue(12e3);
             let body = BodyDescription { name: "organ".into(), mesh, material, pinned: vec![], supports: vec![] };
-            builder.body(body).map(|_| builder)
+            Case { backend, ..case }.add(&mut builder, body).map(|()| builder)
         };
         let mut flat = mesh.clone();
         flat.vertices.iter_mut().for_each(|p| p.z = 0.0);
-        assert!(build(backend, &flat).unwrap_err().to_string().contains("organ"), "{name}");
-        if let Backend::Lattice(settings) = backend {
+        assert!(build(case.backend, &flat).unwrap_err().to_string().contains("organ"), "{name}");
+        if let Backend::Lattice(settings) = case.backend {
             for cell in [0.0, f64::NAN, 1e-5, 0.5] {
                 let error = build(Backend::Lattice(LatticeSettings { cell, ..settings }), &mesh).unwrap_err();
                 assert!(error.to_string().contains("mm"), "{name}: {error}");
             }
         }
-        let (model, state) = busy(backend, &mesh);
+        let (model, state) = busy(case, &mesh);
         // A state of another model is not stepped.
-        let other = State::new(&Scene::new(backend, &mesh).body(tissue(12e3), vec![], vec![]).build());
+        let other = State::new(&Scene::new(case, &mesh).body(tissue(12e3), vec![], vec![]).build());
         let mut stepper = stepper(&model, 1);
         let before = other.clone();
         let mut other = other;
@@ -406,10 +429,11 @@ fn bad_input_is_refused() {
 fn a_clamp_inverts_nothing() {
     let mesh = block([5, 4, 3], 4e-3);
     let pinned = nodes(&mesh, |p| p.x < 1e-9);
-    for (name, backend) in backends() {
-        let mut builder = ModelBuilder::new().backend(backend).tool_contact(ToolContact::Surface);
+    for (name, case) in backends() {
+        let mut builder = ModelBuilder::new().backend(case.backend).tool_contact(ToolContact::Surface);
         let (material, pinned, supports) = (viscous(6e3), pinned.clone(), vec![]);
-        builder.body(BodyDescription { name: "block".into(), mesh: &mesh, material, pinned, supports }).unwrap();
+        let body = BodyDescription { name: "block".into(), mesh: &mesh, material, pinned, supports };
+        case.add(&mut builder, body).unwrap();
         for tool in 0..2 {
             let shape = Shape::Capsule { ends: [-20e-3 * DVec3::Y, 20e-3 * DVec3::Y], radius: 1.5e-3 };
             let name = format!("jaw {tool}");

@@ -4,7 +4,7 @@
 
 use glam::{DQuat, DVec3};
 use trocar_core::Pose;
-use trocar_testing::blocks::{FRAME, block, nodes, tissue};
+use trocar_testing::blocks::{FRAME, block, nodes, refined, tissue};
 use trocar_tissue::{
     BodyDescription, Collider, Compliance, Grasp, Material, Model, ModelBuilder, Shape, SolverSettings, State, Stepper,
     ToolMotion,
@@ -12,8 +12,8 @@ use trocar_tissue::{
 
 const EDGE: f64 = 2e-3;
 
-/// A layer pinned at its bottom, with a ball as tool 1.
-fn layer(young_modulus: f64) -> Model {
+/// A layer pinned at its bottom, with a ball as tool 1; with a finer collision surface if `fine`.
+fn layer(young_modulus: f64, fine: bool) -> Model {
     let mesh = block([10, 10, 5], EDGE);
     let pinned = nodes(&mesh, |p| p.z < 1e-9);
     let material = Material { viscosity: 0.006 * young_modulus, ..tissue(young_modulus) };
@@ -21,6 +21,9 @@ fn layer(young_modulus: f64) -> Model {
     builder
         .body(BodyDescription { name: "layer".into(), mesh: &mesh, material, pinned, supports: Vec::new() })
         .unwrap();
+    if fine {
+        builder.collision_surface(0, &refined(&mesh.boundary().0)).unwrap();
+    }
     let ball = Shape::Sphere { centre: DVec3::ZERO, radius: 4e-3 };
     builder.collider(Collider { name: "ball".into(), tool: 1, shape: ball, rest_offset: 0.0, friction: 0.5 }).unwrap();
     builder.build().unwrap()
@@ -52,23 +55,22 @@ fn moved(tools: &[Pose; 2], about: DVec3, axis: usize, step: f64) -> [Pose; 2] {
 
 /// Settles the layer with tools at `tools`, and compares the stiffness along the first `axes` with
 /// central differences over a frame. Returns the largest difference over the largest stiffness.
-fn compare(name: &str, young_modulus: f64, grasp: Option<Compliance>, tools: [Pose; 2], axes: usize) -> f64 {
-    let model = layer(young_modulus);
-    let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap());
+fn compare(name: &str, model: &Model, grasp: Option<Compliance>, tools: [Pose; 2], axes: usize) -> f64 {
+    let (mut state, mut stepper) = (State::new(model), Stepper::new(model, SolverSettings::FAST, FRAME, 1).unwrap());
     let still = |tools: [Pose; 2]| tools.map(|tool| ToolMotion { from: tool, to: tool });
     if let Some(compliance) = grasp {
         let near = |i: &u32| {
-            let p = state.position(&model, 0, *i as usize);
+            let p = state.position(model, 0, *i as usize);
             p.z > 7e-3 && p.distance(tools[0].translation) < 4e-3
         };
         let held: Vec<u32> = (0..model.bodies()[0].len() as u32).filter(near).collect();
-        state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &tools[0]).compliant(compliance));
+        state.grasps.push(Grasp::capture(model, &state, 0, &held, 0, &tools[0]).compliant(compliance));
     }
     for _ in 0..90 {
-        assert!(stepper.step(&model, &mut state, &still(tools)).divergence.is_none());
+        assert!(stepper.step(model, &mut state, &still(tools)).divergence.is_none());
     }
     let about = DVec3::new(11e-3, 9e-3, 12e-3);
-    let stiffness = stepper.tool_stiffness(&model, &state, &[0, 1], about);
+    let stiffness = stepper.tool_stiffness(model, &state, &[0, 1], about);
     let mut worst: f64 = 0.0;
     // One radian at the lever of the tools is as large as a metre.
     let unit = |axis: usize| if axis < 3 { 1.0 } else { 4e-3 };
@@ -79,7 +81,7 @@ fn compare(name: &str, young_modulus: f64, grasp: Option<Compliance>, tools: [Po
             let mut state = state.clone();
             let next = moved(&tools, about, column, sign * step);
             let motions = [0, 1].map(|k| ToolMotion { from: tools[k], to: next[k] });
-            assert!(stepper.step(&model, &mut state, &motions).divergence.is_none());
+            assert!(stepper.step(model, &mut state, &motions).divergence.is_none());
             wrench(&stepper, &next, about)
         });
         for row in 0..axes {
@@ -88,7 +90,11 @@ fn compare(name: &str, young_modulus: f64, grasp: Option<Compliance>, tools: [Po
             worst = worst.max(off / largest);
         }
     }
-    println!("{name}, {young_modulus} Pa: {largest:.1} N/m, differences {:.1}%", 100.0 * worst);
+    println!(
+        "{name}, {} Pa: {largest:.1} N/m, differences {:.1}%",
+        model.bodies()[0].material().young_modulus,
+        100.0 * worst
+    );
     for i in 0..6 {
         assert!(stiffness[i][i] >= -1e-3 * largest, "{name}: diagonal {i} is {}", stiffness[i][i]);
         for j in 0..6 {
@@ -112,7 +118,7 @@ fn stiffness_of_a_grasp_is_the_derivative_of_its_force() {
     };
     let tool = Pose { translation: DVec3::new(10e-3, 10e-3, 10e-3), ..Pose::IDENTITY };
     for young_modulus in [3e3, 48e3] {
-        let compliant = compare("compliant grasp", young_modulus, Some(compliance), [tool, AWAY], 6);
+        let compliant = compare("compliant grasp", &layer(young_modulus, false), Some(compliance), [tool, AWAY], 6);
         assert!(compliant < 0.02, "{compliant}");
     }
 }
@@ -121,15 +127,17 @@ fn stiffness_of_a_grasp_is_the_derivative_of_its_force() {
 fn stiffness_of_a_contact_is_the_derivative_of_its_force() {
     let ball = Pose { translation: DVec3::new(10e-3, 10e-3, 12.5e-3), ..Pose::IDENTITY };
     for young_modulus in [3e3, 48e3] {
-        let pressed = compare("ball", young_modulus, None, [AWAY, ball], 3);
-        // The ball is 1.5 mm deep in a layer of 10 mm; the stiffness is that of tissue at rest.
-        assert!(pressed < 0.2, "{pressed}");
+        for (name, fine) in [("ball", false), ("ball on a fine surface", true)] {
+            let pressed = compare(name, &layer(young_modulus, fine), None, [AWAY, ball], 3);
+            // The ball is 1.5 mm deep in a layer of 10 mm; the stiffness is that of tissue at rest.
+            assert!(pressed < 0.2, "{pressed}");
+        }
     }
 }
 
 #[test]
 fn nothing_touched_is_no_stiffness_and_steps_keep_their_bits() {
-    let model = layer(12e3);
+    let model = layer(12e3, false);
     let ball = Pose { translation: DVec3::new(10e-3, 10e-3, 12.5e-3), ..Pose::IDENTITY };
     let motions = |pose| [ToolMotion { from: AWAY, to: AWAY }, ToolMotion { from: pose, to: pose }];
     let walk = |asks: bool| {

@@ -2,6 +2,7 @@
 
 use crate::World;
 use glam::DVec3;
+use trocar_geometry::{MeshDistance, TriMesh};
 
 /// A part of a segment inside an element of an organ.
 pub(super) struct Crossing {
@@ -14,7 +15,7 @@ pub(super) struct Crossing {
 }
 
 /// The parts of `segments` inside an organ, by element. Elements whose nodes are all pinned do not
-/// count.
+/// count, nor does what is outside of the organ's collision surface.
 pub(super) fn crossings(world: &World, organ: usize, segments: &[[DVec3; 2]]) -> Vec<Crossing> {
     let ends = segments.iter().flatten();
     let (low, high) = ends.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
@@ -33,6 +34,17 @@ pub(super) fn crossings(world: &World, organ: usize, segments: &[[DVec3; 2]]) ->
         let corners = t.map(|i| places[i]);
         let crossing = |(segment, ends)| Some(Crossing { segment, part: inside(&corners, ends)?, nodes: *nodes });
         found.extend(segments.iter().enumerate().filter_map(crossing));
+    }
+    if let Some(surface) = body.collision_surface().filter(|_| !found.is_empty()) {
+        let vertices = world.state.collision_positions(&world.model, organ);
+        let mesh = TriMesh { vertices, triangles: surface.mesh().triangles.clone(), colors: Vec::new() };
+        // A surface that is not finite ends the episode.
+        if let Ok(field) = MeshDistance::new(&mesh) {
+            found.retain(|Crossing { segment, part, .. }| {
+                let [from, to] = segments[*segment];
+                field.winding(from.lerp(to, 0.5 * (part[0] + part[1]))) > 0.5
+            });
+        }
     }
     found
 }

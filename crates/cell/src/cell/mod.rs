@@ -30,6 +30,7 @@ mod solid;
 mod speeds;
 mod start;
 mod state;
+mod surfaces;
 mod workspace;
 
 pub use action::{Action, ActionSpace};

@@ -1,5 +1,6 @@
 //! The specimen of a scene: placed in the cell frame, with the scene's materials and pins.
 
+use super::surfaces;
 use crate::{Error, Result, Surroundings};
 use glam::DVec3;
 use trocar_core::Pose;
@@ -31,7 +32,15 @@ impl Placed {
         let mut placed = specimen.clone();
         placed.placement = pose;
         placed.up = DVec3::Z;
+        let mut collision = Vec::with_capacity(placed.organs.len());
         for organ in &mut placed.organs {
+            // In the specimen's frame: where it is placed does not change its meshes.
+            let mut surface = match scene.organs.get(&organ.name) {
+                Some(said) => surfaces::choose(scene, organ, &said.surfaces)?,
+                None => None,
+            };
+            surface.iter_mut().flat_map(|mesh| &mut mesh.vertices).for_each(|p| *p = pose.transform(*p));
+            collision.push(surface);
             move_organ(organ, &pose);
         }
         let wrong = |field: String, reason: String| Error::Scene { scene: scene.label(), field, reason };
@@ -83,6 +92,7 @@ impl Placed {
             floating,
             mesh_correction: scene.tissue.mesh_correction,
             toughness,
+            collision,
         };
         let heights = placed.organs.iter().flat_map(|o| &o.body.vertices).map(|p| p.z);
         let floor = heights.fold(f64::INFINITY, f64::min);

@@ -2,7 +2,8 @@
 
 use super::{Checked, Problem, join, name, number, numbers, one_of, point, problem, quaternion};
 use crate::{
-    BackendName, FIELD, MaterialOverride, PHANTOMS, PinEnd, PinRule, Scene, ScheduleName, Source, SpecimenSource,
+    BackendName, CollisionMesh, FIELD, MaterialOverride, PHANTOMS, PinEnd, PinRule, RenderMesh, Scene, ScheduleName,
+    Source, SpecimenSource, Surfaces,
 };
 use trocar_specimen::{End, Material};
 
@@ -23,6 +24,7 @@ pub(super) fn check(scene: &Scene) -> Checked {
         if let Some(rule) = &said.threads {
             rule.threads().validate().map_err(|reason| field_of(&join(&at, "threads"), &reason))?;
         }
+        surfaces(&join(&at, "surfaces"), &said.surfaces, scene)?;
     }
     let t = &scene.tissue;
     numbers(
@@ -121,6 +123,32 @@ fn material(at: &str, said: &MaterialOverride) -> Checked {
     }
     // The ranges of the specimen crate apply, too.
     said.applied_to(Material::default()).validate().map_err(|reason| field_of(at, &reason))
+}
+
+fn surfaces(at: &str, said: &Surfaces, scene: &Scene) -> Checked {
+    match &said.collision {
+        CollisionMesh::Elements => {}
+        CollisionMesh::EdgeMm(edge) => number(&join(at, "collision.edge_mm"), *edge, &CollisionMesh::EDGE_MM)?,
+        CollisionMesh::File(file) => mesh_file(&join(at, "collision.file"), file, scene)?,
+    }
+    match &said.render {
+        RenderMesh::Skin | RenderMesh::Elements | RenderMesh::Collision => Ok(()),
+        RenderMesh::File(file) => mesh_file(&join(at, "render.file"), file, scene),
+    }
+}
+
+/// Checks that a mesh file is there and of a format that is read.
+fn mesh_file(field: &str, file: &str, scene: &Scene) -> Checked {
+    let end = file.to_ascii_lowercase();
+    if ![".ply", ".stl", ".obj"].iter().any(|e| end.ends_with(e)) {
+        let shown: String = file.chars().take(200).flat_map(char::escape_default).collect();
+        return Err(problem(field, format!(" is '{shown}'; it must be a file that ends in .ply, .stl or .obj")));
+    }
+    if scene.resolve(file).is_file() {
+        return Ok(());
+    }
+    let path = scene.resolve(file).display().to_string().replace(['\n', '\r'], " ");
+    Err(problem(field, format!(" is {path}, which is no file; it must be a path from the scene file's folder")))
 }
 
 /// Converts a message of the specimen crate, "field is value; it must be ...".

@@ -226,8 +226,14 @@ impl Oracle {
         Ok(self.groups.iter().map(of_group).collect())
     }
 
-    /// Refuses another model than it was prepared for.
+    /// Refuses another model than it was prepared for, and surfaces that it does not know.
     fn check(&self, model: &Model) -> Result<()> {
+        if let Some(body) = model.bodies().iter().find(|body| body.collision_surface().is_some()) {
+            return Err(Error::Invalid(format!(
+                "body '{}' has a collision surface of its own; the oracle judges contact of the elements' boundary",
+                body.name()
+            )));
+        }
         let lengths = self.groups.iter().flat_map(|group| group.lengths.iter().copied());
         if lengths.eq(model.bodies().iter().map(Body::len)) {
             Ok(())

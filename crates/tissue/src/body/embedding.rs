@@ -16,15 +16,18 @@ const FIT_ROUNDS: usize = 40;
 pub(crate) struct Embedding(Arc<EmbeddingData>);
 
 /// The data of an [`Embedding`].
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct EmbeddingData {
     pub settings: LatticeSettings,
     /// The body's elements that can move, ascending: those of the lattice.
     pub elements: Vec<u32>,
     pub body: LatticeBody,
     pub rest: RestStiffness,
-    /// Point of each vertex (internal order); None for vertices that only pinned elements have.
+    /// Point of each vertex (internal order), those of a collision surface after the nodes; None
+    /// for vertices that only pinned elements have.
     pub points: Vec<Option<EmbeddedPoint>>,
+    /// Number of nodes among the vertices.
+    pub nodes: usize,
 }
 
 impl std::ops::Deref for Embedding {
@@ -39,6 +42,19 @@ impl Embedding {
     /// Shares the data.
     pub fn new(data: EmbeddingData) -> Self {
         Self(Arc::new(data))
+    }
+
+    /// Appends points for the vertices of a collision surface: each with the element of the body
+    /// that it moves with, and its place relative to the body's origin (m).
+    pub fn embed(&mut self, vertices: impl Iterator<Item = (u32, DVec3)>) {
+        let data = Arc::make_mut(&mut self.0);
+        let (elements, nodes) = (&data.elements, data.nodes);
+        let of: Vec<Option<(u32, DVec3)>> =
+            vertices.map(|(element, p)| Some((elements.binary_search(&element).ok()? as u32, p))).collect();
+        let moving: Vec<(u32, DVec3)> = of.iter().flatten().copied().collect();
+        let mut embedded = data.body.lattice().embed_in(&moving).into_iter();
+        data.points.truncate(nodes);
+        data.points.extend(of.iter().map(|vertex| vertex.and_then(|_| embedded.next())));
     }
 
     /// The lattice at rest.
@@ -86,7 +102,8 @@ impl Embedding {
     /// its vertices lack, by their weights, again and again.
     fn fit(&self, wanted: &[Vec3A], field: &mut [DVec3]) {
         let off = |field: &[DVec3]| {
-            let points = self.points.iter().zip(wanted).filter_map(|(point, to)| Some((point.as_ref()?, to)));
+            let points =
+                self.points[..self.nodes].iter().zip(wanted).filter_map(|(point, to)| Some((point.as_ref()?, to)));
             points.map(|(point, to)| (*point, *to, point.interpolate(field))).collect::<Vec<_>>()
         };
         if off(field).iter().all(|(_, to, at)| at.as_vec3a() == *to || !to.is_finite()) {

@@ -5,6 +5,7 @@
 //! rounding of `f32` far below the measured sags. The data that a vertex needs of its elements and
 //! edges are adjacent, in the order in which the sweeps read them.
 
+mod collision;
 pub(crate) mod coloring;
 pub(crate) mod element_lanes;
 mod embedding;
@@ -15,6 +16,8 @@ pub(crate) mod tree;
 mod vertex;
 
 use crate::{LatticeSettings, Material, Support, Tether};
+pub(crate) use collision::BoundVertex;
+pub use collision::CollisionSurface;
 use element_lanes::ElementLanes;
 pub(crate) use embedding::{Embedding, EmbeddingData};
 use glam::{DVec3, Vec3A};
@@ -49,8 +52,18 @@ pub struct BodyData {
     pub(crate) median_edge: f64,
     /// World position of the body's own origin (m).
     pub(crate) origin: DVec3,
-    /// Its boundary.
+    /// A third of the rest area of the boundary's triangles at each node (m2), internal order; 0
+    /// inside.
+    pub(crate) areas: Vec<f64>,
+    /// What touches tools and other bodies: its boundary, or its collision surface.
     pub(crate) surface: Surface,
+    /// Its collision surface, if that is not its boundary.
+    pub(crate) collision: Option<CollisionSurface>,
+    /// The vertices of the collision surface. Vertex k has the internal number `len() + k`.
+    pub(crate) bound: Vec<BoundVertex>,
+    /// By vertex, the stiffness that they bring to the solver's matrix if all of them are pressed
+    /// (N/m); empty without them.
+    pub(crate) bound_stiffness: Vec<f32>,
     /// Internal number of each node.
     pub(crate) internal: Vec<u32>,
     /// First vertex of each colour, and the number of vertices that are not pinned.
@@ -115,6 +128,7 @@ impl Body {
                 && self.tethers == other.tethers
                 && self.contact_stiffness == other.contact_stiffness
                 && self.lattice_settings() == other.lattice_settings()
+                && self.collision == other.collision
                 && self.vertices.iter().map(|v| v.mass).eq(other.vertices.iter().map(|v| v.mass)))
     }
 
@@ -142,6 +156,11 @@ impl Body {
     /// without pins or support falls away from the others.
     pub fn parts(&self) -> usize {
         self.parts
+    }
+
+    /// Its collision surface; None if it is the boundary of its elements.
+    pub fn collision_surface(&self) -> Option<&CollisionSurface> {
+        self.collision.as_ref()
     }
 
     /// Surfaces that it rests on.
@@ -243,14 +262,57 @@ impl Body {
         f64::from(self.tissue_stiffness_of(self.internal[node] as usize))
     }
 
-    /// Young's modulus times the size of a vertex (N/m).
+    /// Young's modulus times the size of a vertex, bound or not (N/m).
     pub(crate) fn tissue_stiffness_of(&self, vertex: usize) -> f32 {
-        self.vertices[vertex].contact_stiffness / self.contact_stiffness as f32
+        self.contact_stiffness_of(vertex as u32) / self.contact_stiffness as f32
     }
 
-    /// Free vertices of the surface (internal numbers), ascending.
+    /// Stiffness of contacts of a vertex, bound or not (N/m).
+    #[inline(always)]
+    pub(crate) fn contact_stiffness_of(&self, vertex: u32) -> f32 {
+        self.bound_vertex(vertex).map_or_else(|| self.vertices[vertex as usize].contact_stiffness, |b| b.stiffness)
+    }
+
+    /// Stiffness that the solver's matrix has for a vertex that is pressed (N/m).
+    pub(crate) fn pressed_stiffness(&self, vertex: usize) -> f32 {
+        let own = self.vertices[vertex].contact_stiffness;
+        self.bound_stiffness.get(vertex).map_or(own, |bound| bound.max(own))
+    }
+
+    /// Number of vertices: nodes, and bound vertices after them.
+    pub(crate) fn vertex_count(&self) -> usize {
+        self.len() + self.bound.len()
+    }
+
+    /// A vertex of the collision surface, by its internal number. None for a node.
+    #[inline(always)]
+    pub(crate) fn bound_vertex(&self, vertex: u32) -> Option<&BoundVertex> {
+        self.bound.get((vertex as usize).wrapping_sub(self.internal.len()))
+    }
+
+    /// Calls `visit(node, share)` for the nodes (internal numbers) that bear a `share` of something
+    /// at a vertex.
+    #[inline(always)]
+    pub(crate) fn for_nodes(&self, vertex: u32, share: f32, mut visit: impl FnMut(u32, f32)) {
+        match self.bound_vertex(vertex) {
+            None => visit(vertex, share),
+            Some(bound) => bound.shares().for_each(|(node, weight)| visit(node, share * weight)),
+        }
+    }
+
+    /// Where a vertex is, with the vertices at `x` (m). Those bound to tetrahedra are where the
+    /// nodes are, and may not have followed them in `x`.
+    #[inline(always)]
+    pub(crate) fn place(&self, x: &[Vec3A], vertex: u32) -> Vec3A {
+        if (vertex as usize) < self.internal.len() || self.lattice.is_some() {
+            return x[vertex as usize];
+        }
+        self.bound[vertex as usize - self.internal.len()].sum(|node| x[node as usize])
+    }
+
+    /// Free nodes of the boundary (internal numbers), ascending.
     pub(crate) fn surface_vertices(&self) -> Vec<u32> {
-        let free = |i: &u32| self.surface.areas[*i as usize] > 0.0 && !self.vertices[*i as usize].pinned;
+        let free = |i: &u32| self.areas[*i as usize] > 0.0 && !self.vertices[*i as usize].pinned;
         (0..self.vertices.len() as u32).filter(free).collect()
     }
 

@@ -3,7 +3,7 @@
 
 use super::tree::Tree;
 use glam::{DVec3, Vec3A};
-use trocar_geometry::TetMesh;
+use trocar_geometry::{TetMesh, TriMesh};
 
 /// Below this distance (m) rounding blurs the direction to the foot, and the pseudonormal is used
 /// instead.
@@ -12,15 +12,13 @@ const MIN_DIRECTION_LENGTH: f32 = 1e-6;
 /// Greatest number of triangles on a walk to the nearest one.
 const MAX_WALK: usize = 16;
 
-/// The boundary of a body. It never changes; the state has the positions.
+/// The surface of a body that touches others: its boundary, or its collision surface. It never
+/// changes; the state has the positions.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Surface {
     /// Corners by internal number, counterclockwise seen from outside; in the tree's order, so that
     /// adjacent triangles are near each other.
     pub triangles: Vec<[u32; 3]>,
-    /// A third of the rest area of the triangles at each vertex of the body (m2), internal order; 0
-    /// inside.
-    pub areas: Vec<f64>,
     /// Boxes over `triangles`.
     pub tree: Tree,
     /// First triangle at each vertex of the body, in `fans`; and the end of the last.
@@ -39,24 +37,32 @@ pub(crate) struct Foot {
 }
 
 impl Surface {
-    /// The boundary of `mesh`, whose node i has the internal number `internal[i]`.
-    pub fn of(mesh: &TetMesh, internal: &[u32]) -> Self {
+    /// The boundary of `mesh`, whose node i has the internal number `internal[i]`; and a third of
+    /// the area of the triangles at each node (m2), internal order.
+    pub fn of(mesh: &TetMesh, internal: &[u32]) -> (Self, Vec<f64>) {
         let (boundary, nodes) = mesh.boundary();
-        let middles: Vec<DVec3> =
-            (0..boundary.triangles.len()).map(|t| boundary.corners(t).iter().sum::<DVec3>() / 3.0).collect();
-        let named = |t: &[u32; 3]| t.map(|i| internal[nodes[i as usize] as usize]);
-        let (order, tree) = Tree::over(&middles, &boundary.triangles.iter().map(named).collect::<Vec<_>>());
-        let triangles: Vec<[u32; 3]> = order.iter().map(|t| named(&boundary.triangles[*t as usize])).collect();
+        let named: Vec<u32> = nodes.iter().map(|node| internal[*node as usize]).collect();
+        Self::over(&boundary, &named, internal.len())
+    }
 
-        let mut areas = vec![0.0; internal.len()];
-        let mut fan_start = vec![0; internal.len() + 1];
+    /// A mesh whose vertex i has the internal number `named[i]`, below `vertices`; and a third of
+    /// the area of the triangles at each vertex (m2).
+    pub fn over(mesh: &TriMesh, named: &[u32], vertices: usize) -> (Self, Vec<f64>) {
+        let middles: Vec<DVec3> =
+            (0..mesh.triangles.len()).map(|t| mesh.corners(t).iter().sum::<DVec3>() / 3.0).collect();
+        let named = |t: &[u32; 3]| t.map(|i| named[i as usize]);
+        let (order, tree) = Tree::over(&middles, &mesh.triangles.iter().map(named).collect::<Vec<_>>());
+        let triangles: Vec<[u32; 3]> = order.iter().map(|t| named(&mesh.triangles[*t as usize])).collect();
+
+        let mut areas = vec![0.0; vertices];
+        let mut fan_start = vec![0; vertices + 1];
         for (triangle, t) in triangles.iter().zip(&order) {
             for i in triangle {
-                areas[*i as usize] += boundary.area_vector(*t as usize).length() / 3.0;
+                areas[*i as usize] += mesh.area_vector(*t as usize).length() / 3.0;
                 fan_start[*i as usize + 1] += 1;
             }
         }
-        for i in 0..internal.len() {
+        for i in 0..vertices {
             fan_start[i + 1] += fan_start[i];
         }
         let mut next = fan_start.clone();
@@ -67,7 +73,7 @@ impl Surface {
                 next[*i as usize] += 1;
             }
         }
-        Self { triangles, areas, tree, fan_start, fans }
+        (Self { triangles, tree, fan_start, fans }, areas)
     }
 
     /// Outward pseudonormal, of any length, at the place `weights` on triangle `t`, vertices at

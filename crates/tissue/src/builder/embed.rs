@@ -47,5 +47,6 @@ pub(crate) fn embed(body: &BodyData, settings: LatticeSettings) -> Result<Option
         points[body.internal[*node as usize] as usize] = Some(point);
     }
     let rest = lattice.rest_stiffness();
-    Ok(Some(Embedding::new(EmbeddingData { settings, elements, body: lattice, rest, points })))
+    let nodes = points.len();
+    Ok(Some(Embedding::new(EmbeddingData { settings, elements, body: lattice, rest, points, nodes })))
 }

@@ -10,7 +10,7 @@ use super::feature_contacts::FeatureContacts;
 use super::force::ToolForce;
 use super::hole_vertices::HoleVertices;
 use super::local_support::LocalSupport;
-use super::site::Site;
+use super::site::{Site, add_share};
 use super::taut::LocalTether;
 use super::tool_placement::{self, Placed};
 use crate::frame::Frame;
@@ -32,14 +32,20 @@ pub(crate) struct ContactSet {
     supports: Vec<LocalSupport>,
     /// By vertex.
     tethers: Vec<LocalTether>,
-    /// Free vertices of the body's surface, ascending.
+    /// Free vertices of the body's surface, ascending; those of a collision surface come after the
+    /// nodes.
     surface: Vec<u32>,
+    /// Number of nodes: vertices with a smaller number are nodes.
+    nodes: usize,
+    /// Whether the body has a collision surface of its own: then its nodes touch no tools.
+    is_bound: bool,
     /// Vertices that may touch something in this frame or hang on a tool, ascending.
     near: Vec<u32>,
     compliant: Vec<CompliantNode>,
     /// By vertex, then those of edges and triangles.
     contacts: Vec<Contact>,
-    /// Number of those of vertices.
+    /// Number of those of nodes, and of all vertices.
+    of_nodes: usize,
     of_vertices: usize,
     features: FeatureContacts,
     /// First contact of each vertex; that of the next vertex is the end.
@@ -54,6 +60,8 @@ pub(crate) struct ContactSet {
     next_anchors: Vec<Anchor>,
     /// Where the colliders are in the substep; None: the tool has no motion.
     placed: Vec<Option<Placed>>,
+    /// Scratch: nodes of a contact with their shares.
+    shares: Vec<(u32, f32)>,
     /// Whether a vertex is one of `surface`.
     outer: Vec<bool>,
     /// Vertices that touch at the frame's beginning or are about to.
@@ -69,25 +77,35 @@ pub(crate) struct ContactSet {
 
 impl ContactSet {
     pub fn new(body: &Body) -> Self {
-        let surface = body.surface_vertices();
+        let mut surface = body.surface_vertices();
+        let (nodes, vertices) = (body.len(), body.vertex_count());
+        let moves = |vertex: &u32| {
+            let bound = body.bound_vertex(*vertex);
+            bound.is_some_and(|bound| bound.shares().any(|(node, _)| !body.vertices[node as usize].pinned))
+        };
+        surface.extend((nodes as u32..vertices as u32).filter(moves));
         Self {
             supports: LocalSupport::of(body),
             tethers: LocalTether::of(body),
-            near: Vec::with_capacity(body.len()),
+            nodes,
+            is_bound: vertices > nodes,
+            near: Vec::with_capacity(vertices),
             compliant: Vec::with_capacity(body.len()),
             contacts: Vec::with_capacity(2 * surface.len()),
+            of_nodes: 0,
             of_vertices: 0,
             features: FeatureContacts::default(),
             places: Vec::with_capacity(2 * surface.len()),
             anchors: Vec::with_capacity(2 * surface.len()),
             next_anchors: Vec::with_capacity(2 * surface.len()),
-            first: vec![0; body.len() + 1],
+            first: vec![0; vertices + 1],
             pressed: Vec::new(),
             first_pressed: vec![0; body.len() + 1],
             placed: Vec::new(),
-            outer: outer(&surface, body.len()),
-            touching: vec![false; body.len()],
-            fixed: vec![false; body.len()],
+            shares: Vec::new(),
+            outer: outer(&surface, vertices),
+            touching: vec![false; vertices],
+            fixed: vec![false; vertices],
             holes: HoleVertices::default(),
             reach: 0.0,
             forces: Vec::new(),
@@ -104,7 +122,7 @@ impl ContactSet {
         self.forces.clear();
         self.forces.resize(frame.tools.len(), ToolForce::default());
         self.mark_fixed(frame, body);
-        self.holes.begin_frame(frame, body);
+        self.holes.begin_frame(frame, body, state);
         compliant_grasp::find(frame, body, &self.fixed, &mut self.compliant);
         tool_placement::place(frame, body, 0.0, 1.0, &mut self.placed);
         // Room for all contacts that a substep may have, so that only the first one allocates.
@@ -127,6 +145,9 @@ impl ContactSet {
         }
         for grasp in frame.rigid_grasps() {
             grasp.nodes.iter().for_each(|i| self.fixed[body.internal[*i as usize] as usize] = true);
+        }
+        for (k, bound) in body.bound.iter().enumerate() {
+            self.fixed[self.nodes + k] = bound.shares().all(|(node, _)| self.fixed[node as usize]);
         }
     }
 
@@ -175,13 +196,28 @@ impl ContactSet {
                 self.touching[i as usize] |= !self.fixed[i as usize];
             }
         }
-        for i in &self.surface {
-            let touches = self.touching[*i as usize];
-            touching += usize::from(touches);
-            changed += usize::from(touches != state.warm.supported[*i as usize]);
+        if self.is_bound {
+            self.spread_touching(body);
+        }
+        let mut count = |i: usize| {
+            touching += usize::from(self.touching[i]);
+            changed += usize::from(self.touching[i] != state.warm.supported[i]);
+        };
+        if self.is_bound {
+            (0..self.nodes).for_each(count);
+        } else {
+            self.surface.iter().for_each(|i| count(*i as usize));
         }
         if changed > MAX_CHANGED_CONTACTS.min(touching / 2) + touching / 8 {
-            state.warm.supported.copy_from_slice(&self.touching);
+            state.warm.supported.copy_from_slice(&self.touching[..self.nodes]);
+        }
+    }
+
+    /// Marks the nodes of the vertices of a collision surface that touch.
+    fn spread_touching(&mut self, body: &Body) {
+        let (nodes, bound) = self.touching.split_at_mut(self.nodes);
+        for (bound, _) in body.bound.iter().zip(bound).filter(|(_, touches)| **touches) {
+            bound.shares().for_each(|(node, _)| nodes[node as usize] |= !self.fixed[node as usize]);
         }
     }
 
@@ -198,7 +234,9 @@ impl ContactSet {
         x: Vec3A,
         mut found: impl FnMut(Source, f32, Vec3A, Vec3A, Vec3A, f32),
     ) {
-        for (s, support) in self.supports.iter().enumerate() {
+        let is_node = vertex < self.nodes;
+        let supports = if is_node { &self.supports[..] } else { &[] };
+        for (s, support) in supports.iter().enumerate() {
             let (height, gradient) = support.contact(x);
             if height <= self.reach {
                 let steepness = gradient.length();
@@ -206,6 +244,9 @@ impl ContactSet {
                 let factor = steepness * steepness;
                 found(Source::Support(s as u32), height, normal, x - height * normal, x, factor);
             }
+        }
+        if self.is_bound && is_node {
+            return;
         }
         for (c, (collider, placed)) in frame.colliders.iter().zip(&self.placed).enumerate() {
             let Some(placed) = placed else { continue };
@@ -245,12 +286,13 @@ impl ContactSet {
         let mut anchor = 0;
         let mut hanging = self.compliant.iter().peekable();
         let mut tethered = self.tethers.iter().peekable();
+        self.of_nodes = 0;
         for vertex in &self.near {
             let i = *vertex as usize;
             let begin = contacts.len();
             let held = hanging.next_if(|h| h.vertex == *vertex);
             if self.outer[i] && !self.fixed[i] {
-                let stiffness = body.vertices[i].contact_stiffness;
+                let stiffness = body.contact_stiffness_of(*vertex);
                 self.for_sources(frame, body, i, x(i), |source, _, normal, point, now, factor| {
                     while self.anchors.get(anchor).is_some_and(|a| (a.vertex, a.source) < (*vertex, source)) {
                         anchor += 1;
@@ -305,6 +347,9 @@ impl ContactSet {
                 }
             }
             self.first[i] = begin as u32 | MARK;
+            if i < self.nodes {
+                self.of_nodes = contacts.len();
+            }
         }
         // Vertices without contacts have an empty range.
         let mut next = contacts.len() as u32;
@@ -372,18 +417,23 @@ impl ContactSet {
         any(&self.first) || any(&self.first_pressed)
     }
 
-    /// Sets the contacts with other bodies, by vertex, and adds those of edges and triangles as
-    /// contacts of each of their vertices while the others stay where they are, at `x`.
-    pub fn press(&mut self, pressed: &[Contact], x: impl Fn(u32) -> Vec3A) {
+    /// Sets the contacts with other bodies, by node, and adds those of edges, triangles and
+    /// vertices of a collision surface as contacts of each of their nodes while the others stay
+    /// where they are, vertices at `x`.
+    pub fn press(&mut self, body: &Body, pressed: &[Contact], x: impl Fn(u32) -> Vec3A) {
         self.pressed.clear();
         self.first_pressed.fill(0);
         let free = |contact: &&Contact| !self.fixed[contact.site.first() as usize];
         self.pressed.extend(pressed.iter().filter(free));
         let others = self.pressed.len();
-        for contact in &self.contacts[self.of_vertices..] {
-            for (vertex, share) in contact.site.shares().filter(|(_, share)| *share > MIN_SHARE) {
-                if !self.fixed[vertex as usize] {
-                    self.pressed.push(contact.of_vertex(vertex, share, x(vertex), contact.site.at(&x)));
+        for contact in &self.contacts[self.of_nodes..] {
+            self.shares.clear();
+            for (vertex, share) in contact.site.shares() {
+                body.for_nodes(vertex, share, |node, share| add_share(&mut self.shares, node, share));
+            }
+            for (node, share) in self.shares.iter().filter(|(_, share)| share.abs() > MIN_SHARE) {
+                if !self.fixed[*node as usize] {
+                    self.pressed.push(contact.of_vertex(*node, *share, x(*node), contact.site.at(&x)));
                 }
             }
         }
@@ -400,7 +450,7 @@ impl ContactSet {
 
     /// Whether contacts that depend on other vertices were set, or are to be.
     pub fn is_pressed(&self) -> bool {
-        !self.pressed.is_empty() || self.contacts.len() > self.of_vertices
+        !self.pressed.is_empty() || self.contacts.len() > self.of_nodes
     }
 
     /// Whether no contact has a force, with the vertices at `x`.
@@ -411,7 +461,7 @@ impl ContactSet {
     /// Stiffness of the contacts and the grasp of a vertex that the quasi-Newton solver's matrix
     /// contains (N/m).
     pub fn stiffness(&self, frame: &Frame<'_>, body: &Body, state: &BodyState, vertex: usize) -> f32 {
-        let pressed = if state.warm.supported[vertex] { body.vertices[vertex].contact_stiffness } else { 0.0 };
+        let pressed = if state.warm.supported[vertex] { body.pressed_stiffness(vertex) } else { 0.0 };
         let held = self.compliant.binary_search_by_key(&(vertex as u32), |h| h.vertex);
         let hangs = held.ok().and_then(|h| frame.grasps[self.compliant[h].grasp as usize].compliance);
         let first = self.tethers.partition_point(|t| (t.vertex as usize) < vertex);

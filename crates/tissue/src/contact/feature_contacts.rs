@@ -67,7 +67,7 @@ impl FeatureContacts {
         self.near.clear();
         self.ends.clear();
         self.vertices.clear();
-        self.x.resize(body.len(), Vec3A::ZERO);
+        self.x.resize(body.vertex_count(), Vec3A::ZERO);
         let triangles = &body.surface.triangles;
         let corners = |t: u32| triangles[t as usize].map(|i| state.x[i as usize]);
         self.balls.clear();
@@ -100,7 +100,7 @@ impl FeatureContacts {
             return;
         }
         self.is_near.clear();
-        self.is_near.resize(body.len(), false);
+        self.is_near.resize(body.vertex_count(), false);
         for t in &self.near {
             for corner in body.surface.triangles[*t as usize] {
                 for around in body.surface.fan(corner) {
@@ -240,7 +240,7 @@ const STIFFNESS: f32 = 4.0;
 fn stiffness(body: &Body, site: &Site) -> f32 {
     let [u, v, w] = site.weights;
     let share = STIFFNESS * (4.0 * (u * v + v * w + w * u)).min(1.0);
-    share * site.shares().map(|(i, weight)| weight * body.vertices[i as usize].contact_stiffness).sum::<f32>()
+    share * site.shares().map(|(i, weight)| weight * body.contact_stiffness_of(i)).sum::<f32>()
 }
 
 /// Number of triangles that are tested together first. The surface keeps near ones together.

@@ -24,6 +24,6 @@ pub(crate) trait Members {
     /// Position of a vertex in the frame of its body (m).
     #[inline(always)]
     fn x(&self, member: usize, vertex: u32) -> Vec3A {
-        self.state(member).x[vertex as usize]
+        self.body(member).place(&self.state(member).x, vertex)
     }
 }

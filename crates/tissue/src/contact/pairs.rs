@@ -10,7 +10,7 @@
 use super::contact::{Contact, Friction, Push};
 use super::coupling::Coupling;
 use super::members::Members;
-use super::site::Site;
+use super::site::{Site, add_share};
 use crate::Body;
 use crate::frame::Frame;
 use crate::state::{Source, Stretch};
@@ -19,6 +19,9 @@ use glam::Vec3A;
 /// Pairs are left out of a substep if their gap exceeds the gap of contact by more than twice their
 /// motion in the substep and this margin (m).
 const SUBSTEP_MARGIN: f32 = 3e-4;
+
+/// Nodes with a smaller share of a pair do not bear it in sweeps, which divide by it.
+const MIN_SHARE: f32 = 1e-6;
 
 /// A vertex at a triangle.
 #[derive(Clone, Copy, Debug)]
@@ -52,14 +55,13 @@ pub(crate) struct Pair {
     listed: bool,
 }
 
-/// A vertex that takes part in a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+/// A node that takes part in a pair.
+#[derive(Clone, Copy, Debug)]
 struct Role {
-    member: u32,
-    vertex: u32,
-    pair: u32,
-    /// Its corner of the triangle; 3: it is the vertex.
-    corner: u32,
+    /// Its body, the node, the pair, and which of the pair's nodes it is, the vertex's last.
+    key: [u32; 4],
+    /// Share of its motion by which the pair's offset changes.
+    share: f32,
 }
 
 /// The pairs of an island during a frame.
@@ -75,6 +77,8 @@ pub(crate) struct Pairs {
     list: Vec<Pair>,
     /// Sorted; for the sweeps.
     roles: Vec<Role>,
+    /// Scratch: bodies, nodes and shares of a pair.
+    nodes: Vec<((u32, u32), f32)>,
     pressed: Vec<Contact>,
 }
 
@@ -279,33 +283,40 @@ impl Pairs {
         }
     }
 
-    /// Lists which vertices of which bodies take part, for the sweeps of a substep.
-    pub fn list_roles(&mut self) {
-        self.roles.clear();
-        for (k, pair) in self.list.iter().enumerate() {
-            for (corner, (member, vertex, share)) in pair.shares().into_iter().enumerate() {
+    /// Lists which nodes of which bodies take part, for the sweeps of a substep.
+    pub fn list_roles(&mut self, island: &(impl Members + ?Sized)) {
+        let Self { list, roles, nodes, .. } = self;
+        roles.clear();
+        for (k, pair) in list.iter().enumerate() {
+            nodes.clear();
+            let [own, corners @ ..] = pair.shares();
+            // The vertex itself comes last.
+            for (member, vertex, share) in corners.into_iter().chain([own]) {
+                island.body(member).for_nodes(vertex, share, |node, share| {
+                    add_share(nodes, (member as u32, node), share);
+                });
+            }
+            for (number, ((member, node), share)) in nodes.iter().enumerate() {
                 // A tiny share is no contact: sweeps divide by it.
-                if share.abs() > 1e-6 {
-                    // The vertex itself comes first among the shares.
-                    let corner = (corner as u32 + 3) % 4;
-                    self.roles.push(Role { member: member as u32, vertex, pair: k as u32, corner });
+                if share.abs() > MIN_SHARE {
+                    roles.push(Role { key: [*member, *node, k as u32, number as u32], share: *share });
                 }
             }
         }
-        self.roles.sort_unstable();
+        roles.sort_unstable_by_key(|role| role.key);
     }
 
-    /// Contacts of a body with the others, by vertex: each for one vertex while the other three of
-    /// its pair are fixed.
+    /// Contacts of a body with the others, by node: each for one node while the others of its pair
+    /// are fixed.
     pub fn contacts_of(&mut self, island: &(impl Members + ?Sized), member: usize) -> &[Contact] {
         let x = |m: usize, vertex: u32| island.x(m, vertex);
         self.pressed.clear();
-        let first = self.roles.partition_point(|role| (role.member as usize) < member);
-        for role in self.roles[first..].iter().take_while(|role| role.member as usize == member) {
-            let pair = &self.list[role.pair as usize];
-            // Share of the vertex's motion by which the offset changes.
-            let share = if role.corner == 3 { 1.0 } else { -pair.weights[role.corner as usize] };
-            self.pressed.push(pair.contact.of_vertex(role.vertex, share, x(member, role.vertex), pair.offset(x)));
+        let first = self.roles.partition_point(|role| (role.key[0] as usize) < member);
+        for Role { key: [_, node, pair, _], share } in
+            self.roles[first..].iter().take_while(|role| role.key[0] as usize == member)
+        {
+            let pair = &self.list[*pair as usize];
+            self.pressed.push(pair.contact.of_vertex(*node, *share, x(member, *node), pair.offset(x)));
         }
         &self.pressed
     }

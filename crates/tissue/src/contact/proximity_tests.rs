@@ -213,13 +213,13 @@ fn surfaces_face_outwards_and_have_their_area() {
     let (boundary, _) = mesh.boundary();
     let body = &model.bodies()[0];
     let x = &State::new(&model).bodies[0].x;
-    assert!((body.surface.areas.iter().sum::<f64>() - boundary.area()).abs() < 1e-9);
+    assert!((body.areas.iter().sum::<f64>() - boundary.area()).abs() < 1e-9);
     let volume: f32 =
         body.surface.triangles.iter().map(|t| t.map(|i| x[i as usize])).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum();
     assert!((f64::from(volume) - mesh.volume()).abs() < 1e-4 * mesh.volume());
     let owned: usize = body.surface.tree.nodes.iter().map(|n| body.surface.tree.owned(n).len()).sum();
     assert_eq!(owned, boundary.vertices.len());
-    assert_eq!(body.surface.areas.iter().filter(|a| **a > 0.0).count(), owned);
+    assert_eq!(body.areas.iter().filter(|a| **a > 0.0).count(), owned);
 }
 
 #[test]

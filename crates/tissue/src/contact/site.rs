@@ -47,3 +47,12 @@ impl Site {
         self.vertices.into_iter().zip(self.weights).filter(|(_, weight)| *weight > 0.0)
     }
 }
+
+/// Adds a share to that of the same node, which several vertices of a collision surface may move
+/// with.
+pub(super) fn add_share<N: PartialEq>(shares: &mut Vec<(N, f32)>, node: N, share: f32) {
+    match shares.iter_mut().find(|(other, _)| *other == node) {
+        Some((_, sum)) => *sum += share,
+        None => shares.push((node, share)),
+    }
+}

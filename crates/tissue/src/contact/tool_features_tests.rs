@@ -18,7 +18,7 @@ fn rough() -> (Surface, Vec<Vec3A>) {
         let by = [0, 1, 2].map(|c| noise(3 * i as u64 + c) - 0.5);
         (*p + 0.35 * DVec3::from_array(by)).as_vec3a()
     };
-    (Surface::of(&mesh, &internal), mesh.vertices.iter().enumerate().map(rough).collect())
+    (Surface::of(&mesh, &internal).0, mesh.vertices.iter().enumerate().map(rough).collect())
 }
 
 fn distance(p: Vec3A, [a, b]: [Vec3A; 2]) -> f32 {

@@ -71,8 +71,8 @@ impl BodyDescent {
     ) {
         let h = self.substep_length(frame);
         let gravity = frame.gravity.as_vec3a();
-        self.start.copy_from_slice(&state.x);
-        let flies = self.settings.start == Start::Adaptive && !self.pressed && self.flies_freely(contacts);
+        self.start.copy_from_slice(&state.x[..body.len()]);
+        let flies = self.settings.start == Start::Adaptive && !self.pressed && self.flies_freely(body, contacts);
         // A body in free flight that no load pushes falls exactly: gravity's part of its motion is
         // uniform and integrated as h^2/2 g. Elsewhere implicit Euler's h^2 g.
         let reach = if flies && !self.loaded { 0.5 * h * h } else { h * h };
@@ -100,7 +100,7 @@ impl BodyDescent {
             isa: self.isa,
             single_thread: self.single_thread,
         };
-        sweep::sweep(&substep, &mut state.x, &mut self.guess);
+        sweep::sweep(&substep, &mut state.x[..body.len()], &mut self.guess);
     }
 
     /// Guesses where the sweeps start from.
@@ -131,7 +131,7 @@ impl BodyDescent {
         let direction = if strength > 0.0 { gravity / strength } else { Vec3A::ZERO };
         // The share of gravity that acts is counted without the loads' own accelerations.
         frame.for_loads(body, |i, force| self.predictor[i] -= force.as_vec3a() * (h * h / body.vertices[i].mass));
-        for i in 0..state.x.len() {
+        for i in 0..body.len() {
             if self.fixed[i] {
                 state.v[i] = Vec3A::ZERO;
                 state.warm.falling[i] = 0.0;
@@ -160,8 +160,8 @@ impl BodyDescent {
     }
 
     /// Whether nothing holds or touches the body.
-    fn flies_freely(&self, contacts: &ContactSet) -> bool {
-        !self.fixed.contains(&true) && contacts.is_idle(|i| self.start[i])
+    fn flies_freely(&self, body: &Body, contacts: &ContactSet) -> bool {
+        !self.fixed.contains(&true) && contacts.is_idle(|i| body.place(&self.start, i as u32))
     }
 
     /// Moves the body to as much of its guess as squeezes no element too far: first all of it, then
@@ -170,12 +170,13 @@ impl BodyDescent {
     fn start_sweeps(&self, body: &Body, state: &mut BodyState) -> bool {
         let mut followed = false;
         for (free, held) in START_SHARES {
-            for (i, x) in state.x.iter_mut().enumerate() {
+            for (i, x) in state.x[..body.len()].iter_mut().enumerate() {
                 let share = if self.held[i] { held } else { free };
                 *x = if share == 1.0 { self.guess[i] } else { self.start[i].lerp(self.guess[i], share) };
             }
             followed = held == 1.0;
-            if !self.squeezes(body, &state.x) && !self.overstretches(body, &state.x) {
+            let x = &state.x[..body.len()];
+            if !self.squeezes(body, x) && !self.overstretches(body, x) {
                 break;
             }
         }

@@ -93,17 +93,17 @@ pub(crate) fn sweep_substep<S: Sweeps>(slots: &mut [BodySlot<S>], pairs: &mut Pa
     for BodySlot { index, body, solver, state, report, .. } in slots.iter_mut() {
         let (descent, contacts) = solver.sweeps();
         iterations = descent.settings.iterations;
-        contacts.press(&[], |i| state.x[i as usize]);
+        contacts.press(body, &[], |i| body.place(&state.x, i));
         descent.start(&frame.of(*index), share, body, contacts, state, report);
     }
-    pairs.list_roles();
+    pairs.list_roles(slots);
     for _ in 0..iterations {
         for member in 0..slots.len() {
             let pressed = if pairs.is_empty() { &[][..] } else { pairs.contacts_of(slots, member) };
             let BodySlot { body, solver, state, .. } = &mut slots[member];
             let (descent, contacts) = solver.sweeps();
             if !pressed.is_empty() || contacts.is_pressed() {
-                contacts.press(pressed, |i| state.x[i as usize]);
+                contacts.press(body, pressed, |i| body.place(&state.x, i));
             }
             descent.sweep(frame, body, contacts, state);
         }
@@ -112,5 +112,6 @@ pub(crate) fn sweep_substep<S: Sweeps>(slots: &mut [BodySlot<S>], pairs: &mut Pa
         let descent = solver.sweeps().0;
         report.iterations += iterations;
         descent.take_velocities(&frame.of(*index), body, state);
+        state.follow_nodes(body);
     }
 }

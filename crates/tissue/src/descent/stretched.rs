@@ -50,7 +50,7 @@ impl StretchedElements {
                 .any(|edge| (x[edge.to as usize] - x[i]).length_squared() > (MIN_EDGE_STRETCH * edge.length).powi(2))
         };
         self.long.clear();
-        self.long.extend((0..x.len()).map(long));
+        self.long.extend((0..body.len()).map(long));
         if !self.long.contains(&true) {
             return;
         }

@@ -176,22 +176,25 @@ impl QuasiNewtonSolver {
     /// Adds to the matrix the tools and supports that press at the substep's beginning or at its
     /// free end. Returns false if it has them all.
     pub fn add_contacts_to_system(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) -> bool {
-        let (x, targets, number) = (&self.iterate.x, &self.iterate.targets, &self.layout.number);
-        let free = self.layout.free;
+        let (x, targets, layout) = (&self.iterate.x, &self.iterate.targets, &self.layout);
         // Edges and triangles may have vertices that are pinned.
-        let places = |vertex: u32| {
-            let i = number[vertex as usize] as usize;
-            [position(&x[i]), position(if i < free { &targets[i] } else { &x[i] })]
-        };
+        let begin = |i: usize| position(&x[i]);
+        let end = |i: usize| position(if i < layout.free { &targets[i] } else { &x[i] });
         let mut new = false;
         let contacts = self.touching.contacts.list().iter();
         for contact in contacts.filter(|contact| !contact.source.is_in_factor()) {
-            let presses = |k: usize| contact.height(contact.site.at(|vertex| places(vertex)[k])) < 0.0;
-            if !(presses(0) || presses(1)) {
+            let presses = |place: &dyn Fn(usize) -> Vec3A| {
+                contact.height(contact.site.at(|vertex| layout.value(vertex, place))) < 0.0
+            };
+            if !(presses(&begin) || presses(&end)) {
                 continue;
             }
-            for (vertex, _) in contact.site.shares().filter(|(i, _)| (number[*i as usize] as usize) < free) {
-                new |= !std::mem::replace(&mut state.warm.supported[vertex as usize], true);
+            for (vertex, share) in contact.site.shares() {
+                layout.for_nodes(vertex, share, |i, _| {
+                    if i < layout.free {
+                        new |= !std::mem::replace(&mut state.warm.supported[layout.vertex[i] as usize], true);
+                    }
+                });
             }
         }
         if new {
@@ -258,13 +261,14 @@ impl QuasiNewtonSolver {
         self.take_own_gradient(h);
         let Self { iterate: Iterate { x, next_gradient, .. }, touching, loads, layout, held, .. } = self;
         for (contact, limit) in touching.contacts.list().iter().zip(&touching.limits) {
-            let number = |vertex: u32| layout.number[vertex as usize] as usize;
-            if let Some(push) = contact.push_within(contact.site.at(|vertex| position(&x[number(vertex)])), *limit) {
+            let here = contact.site.at(|vertex| layout.value(vertex, |i| position(&x[i])));
+            if let Some(push) = contact.push_within(here, *limit) {
                 for (vertex, share) in contact.site.shares() {
-                    let i = number(vertex);
-                    if i < layout.free && !held[i] {
-                        add(&mut next_gradient[i], share * push.gradient);
-                    }
+                    layout.for_nodes(vertex, share, |i, share| {
+                        if i < layout.free && !held[i] {
+                            add(&mut next_gradient[i], share * push.gradient);
+                        }
+                    });
                 }
             }
         }
@@ -303,17 +307,17 @@ impl QuasiNewtonSolver {
         let Self { iterate: Iterate { x, gradient, next_gradient, .. }, touching, layout, held, .. } = self;
         std::mem::swap(gradient, next_gradient);
         for (contact, limit) in touching.contacts.list().iter().zip(&mut touching.limits) {
-            let number = |vertex: u32| layout.number[vertex as usize] as usize;
-            let x = contact.site.at(|vertex| position(&x[number(vertex)]));
+            let x = contact.site.at(|vertex| layout.value(vertex, |i| position(&x[i])));
             let now = contact.limit(x);
             if now != *limit {
                 let push = |limit| contact.push_within(x, limit).map_or(Vec3A::ZERO, |push| push.gradient);
                 let change = push(now) - push(*limit);
                 for (vertex, share) in contact.site.shares() {
-                    let i = number(vertex);
-                    if i < layout.free && !held[i] {
-                        add(&mut gradient[i], share * change);
-                    }
+                    layout.for_nodes(vertex, share, |i, share| {
+                        if i < layout.free && !held[i] {
+                            add(&mut gradient[i], share * change);
+                        }
+                    });
                 }
             }
             *limit = now;
@@ -321,22 +325,29 @@ impl QuasiNewtonSolver {
     }
 
     /// Position of a vertex (m).
+    #[inline(always)]
     pub fn at(&self, vertex: u32) -> Vec3A {
         self.iterate.at(&self.layout, vertex)
     }
 
     /// Adds a force of another body to a vertex's accepted gradient, if the vertex is free to move.
     pub fn push(&mut self, vertex: u32, force: Vec3A) {
-        if let Some(i) = self.free_node(vertex) {
-            add(&mut self.iterate.gradient[i], force);
-        }
+        let Self { iterate, layout, held, .. } = self;
+        layout.for_nodes(vertex, 1.0, |i, share| {
+            if i < layout.free && !held[i] {
+                add(&mut iterate.gradient[i], share * force);
+            }
+        });
     }
 
     /// Adds it to the next gradient.
     pub fn push_next(&mut self, vertex: u32, force: Vec3A) {
-        if let Some(i) = self.free_node(vertex) {
-            add(&mut self.iterate.next_gradient[i], force);
-        }
+        let Self { iterate, layout, held, .. } = self;
+        layout.for_nodes(vertex, 1.0, |i, share| {
+            if i < layout.free && !held[i] {
+                add(&mut iterate.next_gradient[i], share * force);
+            }
+        });
     }
 
     pub(super) fn free_node(&self, vertex: u32) -> Option<usize> {

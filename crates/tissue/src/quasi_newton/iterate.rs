@@ -90,14 +90,14 @@ impl Iterate {
     /// Position of a vertex (m).
     #[inline(always)]
     pub fn at(&self, layout: &Layout, vertex: u32) -> Vec3A {
-        position(&self.x[layout.number[vertex as usize] as usize])
+        layout.value(vertex, |number| position(&self.x[number]))
     }
 
     /// Velocity of a vertex (m/s).
     #[inline(always)]
     pub fn velocity(&self, layout: &Layout, vertex: u32) -> Vec3A {
-        let number = layout.number[vertex as usize] as usize;
-        if number < layout.free { position(&self.v[number]) } else { Vec3A::ZERO }
+        let of = |number: usize| if number < layout.free { position(&self.v[number]) } else { Vec3A::ZERO };
+        layout.value(vertex, of)
     }
 }
 

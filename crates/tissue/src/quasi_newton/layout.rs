@@ -3,8 +3,9 @@
 
 use crate::Body;
 use crate::assembly::shape_gradients;
+use crate::body::BoundVertex;
 use crate::lanes::{LANES, Row};
-use glam::DVec3;
+use glam::{DVec3, Vec3A};
 
 /// Sixteen elements.
 #[derive(Clone)]
@@ -29,8 +30,11 @@ pub(super) struct Layout {
     pub rows: usize,
     /// The body's internal vertex of each node.
     pub vertex: Vec<u32>,
-    /// Number of each of the body's internal vertices here.
+    /// Number of each of the body's nodes, in internal order, here.
     pub number: Vec<u32>,
+    /// The vertices of a collision surface, with the nodes' numbers here. Their internal numbers
+    /// follow those of the nodes.
+    bound: Vec<BoundVertex>,
     /// Elements with a free node.
     pub batches: Vec<Batch>,
     /// Per free node, the indices of its corners among all corners of the batches: those of node i
@@ -47,6 +51,33 @@ pub(super) struct Layout {
 }
 
 impl Layout {
+    /// The value of a field at a vertex, from its values by number.
+    #[inline(always)]
+    pub fn value(&self, vertex: u32, field: impl Fn(usize) -> Vec3A) -> Vec3A {
+        match self.number.get(vertex as usize) {
+            Some(number) => field(*number as usize),
+            None => self.bound[vertex as usize - self.number.len()].sum(|number| field(number as usize)),
+        }
+    }
+
+    /// Calls `visit(number, share)` for the nodes that bear a `share` of something at a vertex.
+    #[inline(always)]
+    pub fn for_nodes(&self, vertex: u32, share: f32, mut visit: impl FnMut(usize, f32)) {
+        match self.number.get(vertex as usize) {
+            Some(number) => visit(*number as usize, share),
+            None => {
+                let bound = &self.bound[vertex as usize - self.number.len()];
+                bound.shares().for_each(|(number, weight)| visit(number as usize, share * weight));
+            }
+        }
+    }
+
+    /// Sum of the magnitudes of a vertex's weights; None for a node.
+    #[inline(always)]
+    pub fn spread(&self, vertex: u32) -> Option<f32> {
+        Some(self.bound.get((vertex as usize).wrapping_sub(self.number.len()))?.spread)
+    }
+
     /// Lays out `body` with its free nodes in the order `order` (original numbers).
     pub fn new(body: &Body, order: &[u32]) -> Self {
         let free = order.len();
@@ -103,6 +134,11 @@ impl Layout {
             rows: free.next_multiple_of(LANES),
             masses: order.iter().map(|i| body.mass(*i as usize) as f32).collect(),
             vertex,
+            bound: body
+                .bound
+                .iter()
+                .map(|b| BoundVertex { nodes: b.nodes.map(|i| number[i as usize]), ..*b })
+                .collect(),
             number,
             batches,
             first_corner,

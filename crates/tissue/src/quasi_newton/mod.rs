@@ -83,9 +83,10 @@ impl Solver for QuasiNewtonSolver {
     }
 
     fn end_frame(island: &mut IslandSystem<'_>) {
-        for BodySlot { solver, state, .. } in island.slots.iter_mut() {
+        for BodySlot { body, solver, state, .. } in island.slots.iter_mut() {
             solver.touching.contacts.end_frame(state);
             solver.iterate.store(&solver.layout, state);
+            state.follow_nodes(body);
         }
         island.pairs.end_frame(island.slots);
     }
@@ -170,6 +171,7 @@ impl IslandSystem<'_> {
             solver.end_substep(&frame.of(*index), body, to);
             if coupled {
                 solver.iterate.store(&solver.layout, state);
+                state.follow_nodes(body);
             }
         });
         self.pairs.end_substep(self.slots);

@@ -89,7 +89,7 @@ impl System {
             self.known.clear();
             for (i, vertex) in layout.vertex[..layout.free].iter().enumerate() {
                 if supported[*vertex as usize] {
-                    self.known.push((i as u32, body.vertices[*vertex as usize].contact_stiffness));
+                    self.known.push((i as u32, body.pressed_stiffness(*vertex as usize)));
                 }
             }
             self.usable = factor.factorise(level, held, &self.contacts);
@@ -136,18 +136,22 @@ impl System {
         }
         pressing.fill(0.0);
         for contact in contacts.list().iter().filter(|contact| !contact.source.is_in_factor()) {
-            let number = |vertex: u32| layout.number[vertex as usize] as usize;
-            let here = contact.site.at(|vertex| position(&x[number(vertex)]));
+            let here = contact.site.at(|vertex| layout.value(vertex, |i| position(&x[i])));
             if contact.height(here) >= 0.0 {
                 continue;
             }
             let stiffness = contact.tangent(here);
             for (vertex, share) in contact.site.shares() {
-                let i = number(vertex);
-                if i < layout.free && !held[i] {
-                    // An edge or triangle, which comes after the vertices, adds to them.
-                    pressing[i] = if contact.site.is_vertex() { stiffness } else { pressing[i] + share * stiffness };
-                }
+                let spread = layout.spread(vertex);
+                let stiffness = spread.unwrap_or(1.0) * stiffness;
+                let is_node = contact.site.is_vertex() && spread.is_none();
+                layout.for_nodes(vertex, share, |i, share| {
+                    if i < layout.free && !held[i] {
+                        // What is between nodes comes after them and adds to them. By weights of
+                        // both signs it is no less than their part of the matrix.
+                        pressing[i] = if is_node { stiffness } else { pressing[i] + share.abs() * stiffness };
+                    }
+                });
             }
         }
         // What remains in `pressing` after this is new.

@@ -124,15 +124,21 @@ impl QuasiNewtonSolver {
 
     /// The springs at free nodes of the body, one a node: between them and the tools, and those of
     /// the preconditioner between them and what stands still.
-    fn springs<'a>(&'a self, body: &Body, group: &ToolGroup<'_>) -> Vec<Spring> {
+    fn springs(&self, body: &Body, group: &ToolGroup<'_>) -> Vec<Spring> {
         let about = (group.about - body.origin).as_vec3a();
         let contacts = self.touching.contacts.list();
         // Tissue in jaws does not slip along the blades: the grasp holds it.
         let held = contacts.iter().any(|c| matches!(c.source, Source::Grasp(..)) && group.moves(c.source));
         let mut springs: Vec<Spring> = Vec::new();
-        let shares = |contact: &'a Contact| contact.site.shares().map(move |(vertex, share)| (vertex, share, contact));
-        let mut touched: Vec<(u32, f32, &Contact)> = contacts.iter().flat_map(shares).collect();
-        // Those of edges and triangles come last in the list.
+        let mut touched: Vec<(u32, f32, &Contact)> = Vec::with_capacity(contacts.len());
+        for contact in contacts {
+            for (vertex, share) in contact.site.shares() {
+                // A spring at a node pulls with none of the weights below 0.
+                let spread = self.layout.spread(vertex).unwrap_or(1.0);
+                body.for_nodes(vertex, share, |node, share| touched.push((node, share.abs() / spread, contact)));
+            }
+        }
+        // Those between nodes come last in the list.
         touched.sort_by_key(|(vertex, ..)| *vertex);
         let mut of_node = touched.chunk_by(|a, b| a.0 == b.0).peekable();
         for vertex in 0..body.len() {

@@ -9,7 +9,8 @@ use xxhash_rust::xxh3::Xxh3;
 /// The state of one body, vertices in the body's internal order, positions relative to its origin.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct BodyState {
-    /// Positions (m).
+    /// Positions (m); those of the vertices of a collision surface come after the nodes'. They
+    /// follow the nodes at the beginning of a frame and after each substep.
     pub x: Vec<Vec3A>,
     /// Velocities (m/s).
     pub v: Vec<Vec3A>,
@@ -47,19 +48,38 @@ pub(crate) struct WarmStart {
 impl BodyState {
     /// At rest in the rest shape.
     pub fn at_rest(body: &Body) -> Self {
-        let mut x = vec![Vec3A::ZERO; body.len()];
+        let mut x = vec![Vec3A::ZERO; body.vertex_count()];
         for (node, p) in body.rest_positions().iter().enumerate() {
             x[body.internal[node] as usize] = (p - body.origin).as_vec3a();
         }
+        if let Some(surface) = body.collision_surface() {
+            for (x, p) in x[body.len()..].iter_mut().zip(&surface.mesh.vertices) {
+                *x = (*p - body.origin).as_vec3a();
+            }
+        }
         Self {
             x,
-            v: vec![Vec3A::ZERO; body.len()],
+            v: vec![Vec3A::ZERO; body.vertex_count()],
             anchors: Vec::with_capacity(2 * body.surface_vertices().len()),
             feature_anchors: Vec::new(),
             stretches: Vec::new(),
             disturbed: false,
             warm: WarmStart { falling: vec![0.0; body.len()], supported: vec![false; body.len()] },
             lattice: body.lattice.as_ref().map(|lattice| lattice.at_rest()),
+        }
+    }
+
+    /// Moves the vertices of a collision surface to where the nodes have it. On a lattice they are
+    /// written with the nodes.
+    pub fn follow_nodes(&mut self, body: &Body) {
+        if body.lattice.is_some() {
+            return;
+        }
+        for (k, bound) in body.bound.iter().enumerate() {
+            for field in [&mut self.x, &mut self.v] {
+                let place = bound.sum(|node| field[node as usize]);
+                field[body.len() + k] = place;
+            }
         }
     }
 
@@ -84,7 +104,9 @@ impl BodyState {
     pub fn hash(&self, hash: &mut Xxh3) {
         let Self { x, v, anchors, feature_anchors, stretches, disturbed, warm, lattice } = self;
         let WarmStart { falling, supported } = warm;
-        for vector in x.iter().chain(v) {
+        // The vertices of a collision surface follow from the nodes.
+        let nodes = falling.len();
+        for vector in x[..nodes].iter().chain(&v[..nodes]) {
             hash_vector(hash, *vector);
         }
         for share in falling {

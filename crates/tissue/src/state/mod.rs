@@ -77,6 +77,21 @@ impl State {
         b.origin + self.bodies[body].x[b.internal[node] as usize].as_dvec3()
     }
 
+    /// World positions of the vertices of a body's collision surface (m); none if that is the
+    /// boundary of its elements.
+    pub fn collision_positions(&self, model: &Model, body: usize) -> Vec<DVec3> {
+        let (b, state) = (&model.bodies[body], &self.bodies[body]);
+        let Some(surface) = b.collision_surface() else { return Vec::new() };
+        let place = |k: usize| {
+            let point = b.lattice.as_ref().and_then(|lattice| lattice.points[b.len() + k]);
+            match (point, &state.lattice) {
+                (Some(point), Some(lattice)) => b.origin + point.interpolate(&lattice.positions),
+                _ => surface.place(k, |node| self.position(model, body, node)),
+            }
+        };
+        (0..surface.mesh.vertices.len()).map(place).collect()
+    }
+
     /// World positions of a body's nodes (m).
     pub fn positions(&self, model: &Model, body: usize) -> Vec<DVec3> {
         (0..model.bodies[body].len()).map(|node| self.position(model, body, node)).collect()

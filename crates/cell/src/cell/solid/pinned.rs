@@ -1,4 +1,5 @@
-//! Tissue that cannot move: the triangles of organs whose three vertices are pinned.
+//! Tissue that cannot move: the triangles of organs whose three vertices are pinned. Of a collision
+//! surface these are vertices whose nodes are all pinned.
 //!
 //! The tissue's own step finds contacts of vertices that move. It has none for pinned vertices, so
 //! such a triangle would let an instrument pass. Here it is a solid for the instrument's axis on
@@ -12,7 +13,7 @@ use crate::World;
 use crate::cell::ContactParts;
 use glam::DVec3;
 use trocar_geometry::{closest_on_triangle, nearest_of_segments};
-use trocar_tissue::Hole;
+use trocar_tissue::{CollisionSurface, Hole};
 
 /// Least cosine of the angle between a triangle's normal and the direction in which it pushes.
 const LEAST_COSINE: f64 = 0.5;
@@ -73,6 +74,10 @@ impl PinnedSurface {
             if !pinned.contains(&true) {
                 continue;
             }
+            if let Some(surface) = body.collision_surface() {
+                triangles.extend(of_surface(world, k, surface));
+                continue;
+            }
             let (boundary, nodes) = body.rest().boundary();
             for t in &boundary.triangles {
                 let nodes = t.map(|i| nodes[i as usize]);
@@ -122,6 +127,25 @@ impl PinnedSurface {
             at += 1;
         }
     }
+}
+
+/// The pinned triangles of the collision surface of `organ`. For holes, a corner is the node with
+/// the greatest weight.
+fn of_surface<'a>(
+    world: &'a World,
+    organ: usize,
+    surface: &'a CollisionSurface,
+) -> impl Iterator<Item = Pinned> + use<'a> {
+    let pinned = world.model.bodies()[organ].pinned();
+    let places = world.state.collision_positions(&world.model, organ);
+    let bearing = |vertex: u32| {
+        let (nodes, weights) = surface.nodes_of(vertex as usize);
+        nodes.into_iter().zip(weights).filter(|(_, weight)| *weight != 0.0)
+    };
+    let is_pinned = move |vertex: &u32| bearing(*vertex).all(|(node, _)| pinned[node as usize]);
+    let node = move |vertex: u32| bearing(vertex).max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(node, _)| node);
+    let still = surface.mesh().triangles.iter().filter(move |t| t.iter().all(is_pinned));
+    still.map(move |t| Pinned { organ, nodes: t.map(node), corners: t.map(|i| places[i as usize]) })
 }
 
 /// Appends the tree over `triangles`, the first of which is number `first`.
