@@ -220,9 +220,9 @@ impl ModelBuilder {
     }
 
     /// Lets the body at `index` touch tools and other bodies with `surface` (m) in the place of the
-    /// boundary of its elements. It is bound to the elements as it lies in the rest shape. Supports,
-    /// threads and grasps still act on nodes. Stiffness is by area that of the boundary, so a force
-    /// does not depend on how fine the surface is. A cut body touches with its boundary
+    /// boundary of its elements. It is bound to the elements as it lies in the rest shape.
+    /// Supports, threads and grasps still act on nodes. Stiffness is by area that of the boundary,
+    /// so a force does not depend on how fine the surface is. A cut body touches with its boundary
     /// ([`crate::sever`]).
     ///
     /// # Errors

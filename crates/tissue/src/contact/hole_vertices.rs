@@ -17,8 +17,8 @@ pub(super) struct HoleVertices {
 impl HoleVertices {
     /// Begins a frame, in which the body is at `state`.
     ///
-    /// A vertex of a collision surface is in a hole if a node that moves it is, or if it is a corner
-    /// of the triangle nearest to a node of the hole: triangles may be wider than the hole.
+    /// A vertex of a collision surface is in a hole if a node that moves it is, or if it is a
+    /// corner of the triangle nearest to a node of the hole: triangles may be wider than the hole.
     pub fn begin_frame(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState) {
         self.through.clear();
         self.vertices = body.vertex_count();

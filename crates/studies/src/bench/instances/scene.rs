@@ -230,8 +230,8 @@ fn lattice_of(mesh: &TetMesh, nodes: usize, fill: f64) -> Result<Lattice> {
     Ok(best)
 }
 
-/// The organ of tetrahedra with the number of nodes that can move nearest to `nodes` that was found.
-/// Those that are pinned are no unknowns; all of the lattice's are.
+/// The organ of tetrahedra of which nearest to `nodes` nodes can move, of those that were tried.
+/// Pinned nodes are no unknowns; all of the lattice's are.
 fn mesh_of(nodes: usize, material: Material) -> Result<(Organs, BenchScene)> {
     let mut tets = 5 * nodes;
     let mut best: Option<(Organs, BenchScene)> = None;
