@@ -188,7 +188,7 @@ fn views(p: &SimilarityPictures, section: Section) -> Result<Section> {
     let bar = page::scale_bar(&SEQUENTIAL, "0", "mean difference of the channels, of 255", "80");
     let legend = page::legend([("both", BOTH), ("real only", ONLY_REAL), ("rendered only", ONLY_RENDERED)]);
     let mut all = vec![
-        figure(&p.real, "the real picture", "<b>Real.</b> The first frame of the recording.")?,
+        figure(&p.real, "the real picture", "<b>Real.</b> A frame of the recording.")?,
         figure(&p.rendered, "the rendered picture", "<b>Rendered.</b> Organs and surroundings, path traced.")?,
         figure(&difference(p), "their difference", &format!("<b>Difference.</b>{bar}"))?,
         figure(&silhouettes(p), "their silhouettes", &format!("<b>Silhouettes.</b>{legend}"))?,
