@@ -4,8 +4,8 @@
 //! from the pivot is r sin(theta / 2). Tissue is grasped only if it lies in the wedge on both sides
 //! of the closing plane and the blades are farther apart than their contact skin.
 //!
-//! Tissue is the elements of an organ, and a layer under its collision surface if it has one of its
-//! own: jaws take hold of what they touch.
+//! Tissue is the elements of an organ. Where an organ has a collision surface of its own, a layer
+//! under this surface is tissue too, because jaws take hold of what they touch.
 
 use crate::clusters::MIN_HELD_NODES;
 use crate::gripper::{BLADE_TIP, BLADE_WIDTH, JAW_REGION_BEGIN};

@@ -3,9 +3,11 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 #![allow(clippy::print_stdout, reason = "what was measured, for those who ask with --nocapture")]
 
+mod common;
+
+use common::{close, shift};
 use glam::DVec3;
-use trocar_cell::{Action, Cell, CellEvent, CellReport, Setpoint};
-use trocar_core::Pose;
+use trocar_cell::{Cell, CellEvent, CellReport};
 use trocar_scene::{Arm, Scene, Side};
 use trocar_testing::tube::{ONE_END, meshed, scene};
 
@@ -28,21 +30,8 @@ fn above(puncture_force_n: f64) -> Cell {
     scene.safety.rules.force_guard = false;
     scene.safety.puncture_force_n = puncture_force_n;
     let mut cell = Cell::new(&scene, &meshed(ONE_END, 2.2e-3), 1).unwrap();
-    let targets: Vec<Setpoint> = cell.observe().iter().map(|a| a.commanded.with_jaw(0.0)).collect();
-    (0..30).for_each(|_| drop(cell.step(&Action::targets(&targets)).unwrap()));
+    close(&mut cell, 30);
     cell
-}
-
-/// Steps for `periods` with the tip commanded to move by `way` (m) in all.
-fn shift(cell: &mut Cell, way: DVec3, periods: usize) -> Vec<CellReport> {
-    let tip = cell.measured_cp("left").unwrap();
-    let from = cell.observe()[0].commanded;
-    let step = |n: usize| {
-        let translation = tip.translation + way * (n as f64 / periods as f64);
-        Action::targets(&[cell.solve("left", &Pose { translation, ..tip }, &from).unwrap().setpoint])
-    };
-    let actions: Vec<Action> = (1..=periods).map(step).collect();
-    actions.iter().map(|action| cell.step(action).unwrap()).collect()
 }
 
 /// The forces of punctures (N).
@@ -68,7 +57,7 @@ fn force(reports: &[CellReport]) -> f64 {
 fn a_rod_that_presses_hard_enough_punctures_a_thin_organ_once() {
     let threshold = 10.0;
     let mut cell = above(threshold);
-    let down = shift(&mut cell, THROUGH, FAST);
+    let down = shift(&mut cell, "left", THROUGH, FAST);
     let forces = punctures(&down);
     assert!(forces.len() == 1 && forces[0] >= threshold, "{forces:?} N");
     assert_eq!(down.iter().map(|r| r.rules.punctures).sum::<usize>(), 1);
@@ -77,23 +66,23 @@ fn a_rod_that_presses_hard_enough_punctures_a_thin_organ_once() {
     assert_eq!(cell.axes_inside(), [false], "an axis in a hole is not counted");
 
     // In the hole nothing punctures again, and the instrument slides without a load.
-    let on = shift(&mut cell, -0.003 * DVec3::Z, 20);
+    let on = shift(&mut cell, "left", -0.003 * DVec3::Z, 20);
     assert!(punctures(&on).is_empty() && cell.punctured_by(0) == [0]);
 
     // The same bits after a restore in the hole, also in another cell.
     let saved = cell.save();
-    let later = (shift(&mut cell, 0.002 * DVec3::Z, 8), cell.hash());
+    let later = (shift(&mut cell, "left", 0.002 * DVec3::Z, 8), cell.hash());
     cell.restore(&saved).unwrap();
-    assert_eq!((shift(&mut cell, 0.002 * DVec3::Z, 8), cell.hash()), later);
+    assert_eq!((shift(&mut cell, "left", 0.002 * DVec3::Z, 8), cell.hash()), later);
     let mut other = above(threshold);
     other.restore(&saved).unwrap();
-    assert_eq!((shift(&mut other, 0.002 * DVec3::Z, 8), other.hash()), later);
+    assert_eq!((shift(&mut other, "left", 0.002 * DVec3::Z, 8), other.hash()), later);
 
     // Out of it the hole is gone, and tissue touches the instrument as before.
-    let out = shift(&mut cell, 0.03 * DVec3::Z, 60);
+    let out = shift(&mut cell, "left", 0.03 * DVec3::Z, 60);
     assert!(cell.punctured_by(0).is_empty() && punctures(&out).is_empty());
     assert_eq!(force(&out[50..]), 0.0);
-    let again = shift(&mut cell, -0.0155 * DVec3::Z, 60);
+    let again = shift(&mut cell, "left", -0.0155 * DVec3::Z, 60);
     assert!(force(&again) > 0.05, "{} N", force(&again));
     assert!(punctures(&again).is_empty() && cell.axes_inside() == [false], "it lies on the surface");
 }
@@ -101,7 +90,7 @@ fn a_rod_that_presses_hard_enough_punctures_a_thin_organ_once() {
 #[test]
 fn below_the_threshold_nothing_is_punctured() {
     let mut cell = above(1000.0);
-    let down = shift(&mut cell, THROUGH, FAST);
+    let down = shift(&mut cell, "left", THROUGH, FAST);
     assert!(force(&down) > 5.0, "it presses as hard as in the other test: {} N", force(&down));
     assert!(punctures(&down).is_empty() && cell.punctured_by(0).is_empty());
     assert!(pierced(&down) > 0 && cell.pierces("left").unwrap(), "it is counted instead");

@@ -3,6 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 #![allow(clippy::print_stdout, reason = "what was measured, for those who ask with --nocapture")]
 
+mod common;
+
+use common::{close, shift};
 use glam::{DMat3, DQuat, DVec3};
 use trocar_cell::{Action, Cell, CellEvent, CellReport, Setpoint};
 use trocar_core::Pose;
@@ -17,21 +20,6 @@ fn aside() -> (Scene, Specimen) {
     (scene, two_tubes(ONE_END, 4e-3))
 }
 
-/// Steps for `periods` with the tip of `arm` commanded to move by `way` (m) in all.
-fn shift(cell: &mut Cell, arm: &str, way: DVec3, periods: usize) -> Vec<CellReport> {
-    let k = cell.arm_index(arm).unwrap();
-    let tip = cell.measured_cp(arm).unwrap();
-    let from: Vec<Setpoint> = cell.observe().iter().map(|a| a.commanded).collect();
-    let step = |n: usize| {
-        let translation = tip.translation + way * (n as f64 / periods as f64).min(1.0);
-        let mut all = from.clone();
-        all[k] = cell.solve(arm, &Pose { translation, ..tip }, &from[k]).unwrap().setpoint;
-        Action::targets(&all)
-    };
-    let actions: Vec<Action> = (1..=periods).map(step).collect();
-    actions.iter().map(|action| cell.step(action).unwrap()).collect()
-}
-
 fn rest(cell: &mut Cell, periods: usize) -> Vec<CellReport> {
     (0..periods).map(|_| cell.step(None).unwrap()).collect()
 }
@@ -40,16 +28,10 @@ fn most(reports: &[CellReport], of: impl Fn(&CellReport) -> f64) -> f64 {
     reports.iter().map(of).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// Closes all jaws.
-fn close(cell: &mut Cell) {
-    let targets: Vec<Setpoint> = cell.observe().iter().map(|a| a.commanded.with_jaw(0.0)).collect();
-    (0..15).for_each(|_| drop(cell.step(&Action::targets(&targets)).unwrap()));
-}
-
 /// Closes all jaws, raises the left tip by 20 mm and moves it by 60 mm at 0.1 m/s, through where
 /// the right shaft is.
 fn cross(cell: &mut Cell) -> Vec<CellReport> {
-    close(cell);
+    close(cell, 15);
     shift(cell, "left", 0.02 * DVec3::Z, 15);
     shift(cell, "left", 0.06 * DVec3::X, 18)
 }
@@ -144,7 +126,7 @@ fn a_command_that_runs_far_ahead_takes_no_ideal_arm_through_a_solid() {
     scene.instruments.truncate(1);
     scene.safety.rules.force_guard = false;
     let mut cell = Cell::new(&scene, &meshed(Pins::Band { share: 1.0 }, 2.2e-3), 1).unwrap();
-    close(&mut cell);
+    close(&mut cell, 15);
     // The blades' tips are 0.1 m above the floor; the command goes to 0.08 m below it.
     let all = shift(&mut cell, "left", -0.18 * DVec3::Z, 60);
     let last = all.last().unwrap();
@@ -169,7 +151,7 @@ fn the_bed_stops_joint_commands_which_know_no_floor() {
         organ.base.z += 0.03;
     }
     let mut cell = Cell::new(&scene, &low, 1).unwrap();
-    close(&mut cell);
+    close(&mut cell, 15);
     let open = Cell::new(&scene, &high, 1).unwrap();
     let floor = specimen_floor(&open);
     let tip = cell.measured_cp("left").unwrap();
@@ -180,7 +162,7 @@ fn the_bed_stops_joint_commands_which_know_no_floor() {
     let joints = cell.measured_js("left").unwrap().position;
 
     let mut cell = Cell::new(&scene, &high, 1).unwrap();
-    close(&mut cell);
+    close(&mut cell, 15);
     let from = cell.measured_js("left").unwrap().position;
     for k in 1..=60 {
         let share = f64::from(k) / 60.0;

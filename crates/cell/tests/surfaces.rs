@@ -4,9 +4,11 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 #![allow(clippy::print_stdout, reason = "what was measured, for those who ask with --nocapture")]
 
+mod common;
+
+use common::{close, shift};
 use glam::DVec3;
-use trocar_cell::{Action, Cell, CellReport, Gripper, JawRegion, MAX_ANGLE, Placed, Setpoint, Surroundings, World};
-use trocar_core::Pose;
+use trocar_cell::{Cell, Gripper, JawRegion, MAX_ANGLE, Placed, Surroundings, World};
 use trocar_geometry::TriMesh;
 use trocar_geometry::io::write_ply;
 use trocar_scene::{Arm, BackendName, CollisionMesh, RenderMesh, Scene, Side, Surfaces};
@@ -37,21 +39,8 @@ fn touching(collision: CollisionMesh) -> Surfaces {
 
 fn closed(scene: &Scene, specimen: &Specimen) -> Cell {
     let mut cell = Cell::new(scene, specimen, 1).unwrap();
-    let targets: Vec<Setpoint> = cell.observe().iter().map(|a| a.commanded.with_jaw(0.0)).collect();
-    (0..30).for_each(|_| drop(cell.step(&Action::targets(&targets)).unwrap()));
+    close(&mut cell, 30);
     cell
-}
-
-/// Steps for `periods` with the tip commanded to move by `way` (m) in all.
-fn shift(cell: &mut Cell, way: DVec3, periods: usize) -> Vec<CellReport> {
-    let tip = cell.measured_cp("left").unwrap();
-    let from = cell.observe()[0].commanded;
-    let step = |n: usize| {
-        let translation = tip.translation + way * (n as f64 / periods as f64);
-        Action::targets(&[cell.solve("left", &Pose { translation, ..tip }, &from).unwrap().setpoint])
-    };
-    let actions: Vec<Action> = (1..=periods).map(step).collect();
-    actions.iter().map(|action| cell.step(action).unwrap()).collect()
 }
 
 /// A mesh with its distance from the axis of the tube times `factor`, in the tube's own frame.
@@ -76,16 +65,16 @@ fn an_instrument_meets_the_surface_that_the_scene_chooses() {
             let own = collision != CollisionMesh::Elements;
             let mut cell = closed(&above(touching(collision), backend), &specimen(ONE_END));
             assert_eq!(cell.world().model.bodies()[0].collision_surface().is_some(), own);
-            shift(&mut cell, DVec3::Z * -0.013, 40);
-            let still = shift(&mut cell, DVec3::ZERO, 10);
+            shift(&mut cell, "left", DVec3::Z * -0.013, 40);
+            let still = shift(&mut cell, "left", DVec3::ZERO, 10);
             assert_eq!(still.iter().map(|r| r.rules.pierced + r.rules.punctures).sum::<usize>(), 0);
             assert_eq!(cell.axes_inside(), [false]);
             // A saved cell goes on with the same bits.
             let saved = cell.save();
-            shift(&mut cell, DVec3::Z * -0.0005, 5);
+            shift(&mut cell, "left", DVec3::Z * -0.0005, 5);
             let hash = cell.hash();
             cell.restore(&saved).unwrap();
-            shift(&mut cell, DVec3::Z * -0.0005, 5);
+            shift(&mut cell, "left", DVec3::Z * -0.0005, 5);
             assert_eq!(cell.hash(), hash, "{backend:?}");
             still[9].arms[0].contact.length()
         };
@@ -104,10 +93,10 @@ fn an_instrument_that_comes_through_a_surface_of_its_own_punctures_the_organ() {
     let mut scene = above(touching(CollisionMesh::EdgeMm(3.0)), BackendName::Tetrahedra);
     scene.safety.puncture_force_n = 10.0;
     let mut cell = closed(&scene, &meshed(ONE_END, 2.2e-3));
-    let down = shift(&mut cell, DVec3::Z * -0.026, 10);
+    let down = shift(&mut cell, "left", DVec3::Z * -0.026, 10);
     assert_eq!(down.iter().map(|r| r.rules.punctures).sum::<usize>(), 1);
     assert_eq!((cell.punctured_by(0), cell.axes_inside()), (vec![0], vec![false]));
-    let out = shift(&mut cell, DVec3::Z * 0.03, 60);
+    let out = shift(&mut cell, "left", DVec3::Z * 0.03, 60);
     assert!(cell.punctured_by(0).is_empty());
     assert_eq!(out[55..].iter().map(|r| r.arms[0].contact.length()).fold(0.0, f64::max), 0.0);
 }
@@ -144,7 +133,7 @@ fn pinned_tissue_stops_an_instrument_at_the_chosen_surface() {
     let path = file(&dir, &thicker(&pinned.organs[0].surface, 1.3));
     let lowest = |collision: CollisionMesh| {
         let mut cell = closed(&above(touching(collision), BackendName::Tetrahedra), &pinned);
-        shift(&mut cell, DVec3::Z * -0.02, 60);
+        shift(&mut cell, "left", DVec3::Z * -0.02, 60);
         cell.measured_cp("left").unwrap().translation.z
     };
     let (plain, thick) = (lowest(CollisionMesh::Elements), lowest(CollisionMesh::File(path)));

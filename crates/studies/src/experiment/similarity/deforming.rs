@@ -159,11 +159,14 @@ impl Lifted<'_> {
         let stages = organ.lift_at(&seen.pull(Grip::Place), Pace::SLOW, &[0.0, 1.0], progress)?;
         let stages = stages.ok_or_else(|| Error::Mismatch(format!("the simulated lift {number} diverged")))?;
         let info = &seen.lift.info;
-        let moments = [(Moment::Rest, info.rest, None), (Moment::Load, seen.lift.peak, Some(number))];
-        let row = |((moment, frame, load), stage): ((Moment, usize, Option<usize>), &trocar_identify::Lifted)| {
+        let moments = [(Moment::Rest, info.rest), (Moment::Load, seen.lift.peak)];
+        let row = |((moment, frame), stage): ((Moment, usize), &trocar_identify::Lifted)| {
             let scenery = self.rest.with(lifted, organ.places_of(stage, &skin));
-            let displacement_mm = if load.is_some() { 1e3 * seen.displacement.length() } else { 0.0 };
-            self.row((number, moment, displacement_mm), (frame, load), &scenery, folder)
+            let displacement_mm = match moment {
+                Moment::Rest => 0.0,
+                Moment::Load => 1e3 * seen.displacement.length(),
+            };
+            self.row((number, moment, displacement_mm), frame, &scenery, folder)
         };
         moments.into_iter().zip(&stages).map(row).collect()
     }
@@ -171,15 +174,20 @@ impl Lifted<'_> {
     fn row(
         &self,
         (lift, moment, displacement_mm): (usize, Moment, f64),
-        (frame, load): (usize, Option<usize>),
+        frame: usize,
         scenery: &Scenery,
         folder: &Path,
     ) -> Result<(DeformingRow, SimilarityPictures)> {
-        let (filmed, second) = (self.recording.frame(frame)?, self.recording.frame(frame + 1)?);
+        let filmed = self.recording.frame(frame)?;
+        let next = (frame + 1 < self.recording.len()).then(|| self.recording.frame(frame + 1)).transpose()?;
+        let (load, name) = match moment {
+            Moment::Rest => (None, "rest"),
+            Moment::Load => (Some(lift), "load"),
+        };
         let camera = scenery.camera;
         let covered = grown(&filmed.instruments);
         let organs = &self.made.specimen.organs;
-        // Nothing is known of what instruments hide.
+        // Nobody can see what instruments hide, so these pixels count for neither side.
         let masks = |labels: &[u16]| -> Vec<Mask> {
             let open: Vec<u16> =
                 labels.iter().zip(&covered.set).map(|(l, hidden)| if *hidden { 0 } else { *l }).collect();
@@ -204,10 +212,9 @@ impl Lifted<'_> {
             real: &filmed.color,
             rendered: &rendered,
             covered: &filmed.instruments,
-            second: Some((&second.color, &second.instruments)),
+            second: next.as_ref().map(|next| (&next.color, &next.instruments)),
             composite: None,
         })?;
-        let name = if load.is_some() { "load" } else { "rest" };
         rendered.write_png(&folder.join(format!("lift-{lift}-{name}-rendered.png")))?;
         filmed.color.write_png(&folder.join(format!("lift-{lift}-{name}-filmed.png")))?;
         let row = DeformingRow {
