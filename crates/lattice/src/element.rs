@@ -7,6 +7,7 @@
 use crate::Hexahedron;
 use crate::flow::Flow;
 use crate::material::{Material, Part, Principal};
+use fearless_simd::{Level, dispatch};
 use glam::{DMat3, DVec3};
 use trocar_geometry::symmetric::{Svd, nearest_rotation};
 
@@ -104,6 +105,16 @@ impl Element<'_> {
     /// The rotation of the cell's middle.
     pub fn rotation(&self, x: &[DVec3; 8]) -> DMat3 {
         nearest_rotation(deformation(x, &self.gradients(DVec3::splat(0.5))))
+    }
+
+    /// Greatest Frobenius norm of Green's strain (F'F - I)/2 at the points of the deviatoric part.
+    pub fn strain(&self, x: &[DVec3; 8]) -> f64 {
+        let [xx, yy, zz, xy, yz, zx] = dispatch!(Level::new(), simd => self.green(simd, x));
+        let squared = |p: usize| {
+            let (diagonal, others) = ([xx[p] - 1.0, yy[p] - 1.0, zz[p] - 1.0], [xy[p], yz[p], zx[p]]);
+            diagonal.iter().map(|c| c * c).sum::<f64>() + 2.0 * others.iter().map(|c| c * c).sum::<f64>()
+        };
+        0.5 * (0..8).map(squared).fold(0.0, f64::max).sqrt()
     }
 
     /// Adds the stiffness of viscosity.

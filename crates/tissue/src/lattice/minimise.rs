@@ -17,8 +17,8 @@ const MEMORY: usize = 12;
 /// Share of the linear decrease that a step must bring (Armijo).
 const ARMIJO: f64 = 1e-4;
 
-/// Greatest number of halvings of a step.
-const MAX_HALVINGS: usize = 20;
+/// Greatest number of times that a step is shortened, each time to a tenth at least.
+const MAX_CUTS: usize = 20;
 
 /// Steps before the factors are made again.
 const MAX_STEPS_OF_A_FACTOR: usize = 25;
@@ -235,13 +235,15 @@ impl Island<'_> {
         direction
     }
 
-    /// The longest of the halved steps that lowers the energy enough.
+    /// A step that lowers the energy enough: the whole direction, or the part of it where a parabola
+    /// through the energies so far is lowest, between a tenth and half of the last trial (Nocedal
+    /// and Wright, section 3.5).
     fn search(&self, direction: &[Vec<DVec3>], slope: f64, value: &Value) -> Option<(Vec<Vec<DVec3>>, Value, f64)> {
         if slope.is_nan() || slope >= 0.0 {
             return None;
         }
         let mut share = 1.0;
-        for _ in 0..MAX_HALVINGS {
+        for _ in 0..MAX_CUTS {
             let mut x = self.x.clone();
             add(&mut x, share, direction);
             let next = self.evaluate(&x, direction, value);
@@ -257,7 +259,10 @@ impl Island<'_> {
             if whole && (lower || (same && nearer())) {
                 return Some((x, next, share));
             }
-            share *= 0.5;
+            let above = next.energy - (value.energy + share * slope);
+            let lowest = if whole && above > 0.0 { -0.5 * slope * share * share / above } else { 0.0 };
+            // Energies that are not finite say nothing.
+            share = if lowest > 0.0 { lowest.clamp(0.1 * share, 0.5 * share) } else { 0.5 * share };
         }
         None
     }
