@@ -1,6 +1,7 @@
 """Steps a second of one cell and of many in one process.
 
-    python python/benchmarks/vector.py [--cells 1 16 64] [--obs state] [--steps 60] [--json]
+    python python/benchmarks/vector.py [--cells 1 16 64] [--obs state] [--backend lattice]
+        [--steps 60] [--json]
 
 Figures are per second and per CPU second, because machines are shared. The ratio of many cells to
 one by CPU time is the cost or gain of one process for many cells.
@@ -17,11 +18,13 @@ import numpy as np
 import trocar  # noqa: F401  (registers the environments)
 
 
-def measured(cells: int, obs: str, steps: int, threads: int) -> dict[str, float]:
+def measured(
+    cells: int, obs: str, backend: str | None, steps: int, threads: int
+) -> dict[str, float]:
     """Steps `cells` cells with the same small random motions."""
     name = "trocar/GraspLift-v0"
     options: dict[str, Any] = {"obs": obs, "threads": threads, "normalize": True, "actions": "tip"}
-    options["variation"] = "none"
+    options |= {"variation": "none", "backend": backend}
     start = time.process_time()
     envs = gym.make_vec(
         name, num_envs=cells, vectorization_mode="vector_entry_point", copy=False, **options
@@ -50,6 +53,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cells", type=int, nargs="+", default=[1, 16, 64])
     parser.add_argument("--obs", default="state", help="what is observed, such as state+rgb")
+    parser.add_argument("--backend", help="tetrahedra or lattice (default: the scene's)")
     parser.add_argument(
         "--steps", type=int, default=60, help="steps of one cell; many cells do fewer, at least 10"
     )
@@ -57,7 +61,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     rows = [
-        measured(n, options.obs, max(10, options.steps // n), options.threads)
+        measured(n, options.obs, options.backend, max(10, options.steps // n), options.threads)
         for n in options.cells
     ]
     if options.json:
