@@ -3,8 +3,11 @@
 
 mod cube;
 mod data;
+mod lattice;
+mod method;
 mod page;
 mod result;
+mod stepped;
 
 pub use result::TruthCubeResult;
 
@@ -14,11 +17,11 @@ use crate::trials::Outcomes;
 use clap::Args;
 use cube::{Cube, Kind, Law, distances};
 use data::Beads;
+use method::{Method, Model};
 use result::{ByStrain, CubeRow, figures};
 use std::path::PathBuf;
 use trocar_report::document::Document;
 use trocar_tissue::ConstitutiveModel;
-use trocar_tissue_reference::statics::Elements;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Where the data are unless told otherwise, beside the project.
@@ -27,10 +30,16 @@ const DATA: &str = "../shared/data/truth_cube/uniaxial_positions.csv";
 /// Cells across the cube, of tetrahedra at three sizes.
 const CELLS: [usize; 3] = [4, 6, 8];
 
+/// A finer size, of lattices.
+const FINE_CELLS: usize = 16;
+
 /// The model of the study's headline: what the cell steps unless told otherwise, with Poisson's
 /// ratio as the authors of the data give it.
 const CHOSEN: Trial =
-    Trial { kind: Kind::Linear, cells: 8, law: Law::Finite(ConstitutiveModel::StableNeoHookean), poisson_ratio: 0.499 };
+    Trial { method: Method::Tetrahedra(Kind::Linear), cells: 8, law: NEO_HOOKEAN, poisson_ratio: 0.499 };
+
+/// The law of both backends.
+const NEO_HOOKEAN: Law = Law::Finite(ConstitutiveModel::StableNeoHookean);
 
 /// Poisson's ratios.
 const RATIOS: [f64; 3] = [0.45, 0.49, 0.499];
@@ -50,7 +59,7 @@ pub struct TruthCubeExperiment {
 
 /// One model of the cube.
 struct Trial {
-    kind: Kind,
+    method: Method,
     cells: usize,
     law: Law,
     poisson_ratio: f64,
@@ -70,23 +79,18 @@ impl Study for TruthCubeExperiment {
         let trials = trials();
         let places: Vec<_> = beads.strains.iter().map(|strain| (&strain.percent, &strain.at)).collect();
         let settings = format!("{:016x}", xxh3_64(format!("{:?} {places:?}", beads.rest).as_bytes()));
-        let Outcomes { rows, .. } = job.trials(
-            "models",
-            &settings,
-            &trials,
-            Trial::key,
-            self.threads,
-            |trial, _| Ok(trial.run(&cube, &beads)),
-        )?;
-        let elements = CHOSEN.elements(&cube);
-        let predicted = beads.strains.iter().map(|strain| cube.predict(&elements, CHOSEN.law, strain));
-        let result = TruthCubeResult::of(&beads, rows, CHOSEN.run(&cube, &beads), predicted.collect::<Result<_>>()?);
+        let Outcomes { rows, .. } =
+            job.trials("models", &settings, &trials, Trial::key, self.threads, |trial, _| trial.run(&cube, &beads))?;
+        let model = CHOSEN.model(&cube)?;
+        let predicted = beads.strains.iter().map(|strain| model.predict(strain));
+        let result = TruthCubeResult::of(&beads, rows, CHOSEN.run(&cube, &beads)?, predicted.collect::<Result<_>>()?);
         let document = page::document(&beads, &result)?;
         Ok((result, document))
     }
 }
 
-/// All models: every law, ratio and size with linear tetrahedra, and what mends their locking.
+/// All models: every law, ratio and size with linear tetrahedra, what mends their locking, and
+/// lattices; and what the solver of the cell makes of the two backends.
 fn trials() -> Vec<Trial> {
     let laws = ConstitutiveModel::ALL.map(Law::Finite).into_iter().chain([Law::Linear]);
     let mut all = Vec::new();
@@ -94,43 +98,53 @@ fn trials() -> Vec<Trial> {
         for poisson_ratio in RATIOS {
             for cells in CELLS {
                 for kind in [Kind::Linear, Kind::Corrected, Kind::Patches] {
-                    all.push(Trial { kind, cells, law, poisson_ratio });
+                    all.push(Trial { method: Method::Tetrahedra(kind), cells, law, poisson_ratio });
                 }
             }
-            all.push(Trial { kind: Kind::Quadratic, cells: CELLS[1], law, poisson_ratio });
+            let method = Method::Tetrahedra(Kind::Quadratic);
+            all.push(Trial { method, cells: CELLS[1], law, poisson_ratio });
         }
+    }
+    for law in [NEO_HOOKEAN, Law::Rotated] {
+        for poisson_ratio in RATIOS {
+            let cells = CELLS.into_iter().chain([FINE_CELLS]);
+            all.extend(cells.map(|cells| Trial { method: Method::Lattice, cells, law, poisson_ratio }));
+        }
+    }
+    for method in [Method::SteppedTetrahedra, Method::SteppedLattice] {
+        all.push(Trial { method, cells: CELLS[1], law: NEO_HOOKEAN, poisson_ratio: CHOSEN.poisson_ratio });
     }
     all
 }
 
 impl Trial {
     fn key(&self) -> String {
-        format!("{:?}, {}, {:?}, {}", self.kind, self.cells, self.law, self.poisson_ratio)
+        format!("{:?}, {}, {:?}, {}", self.method, self.cells, self.law, self.poisson_ratio)
     }
 
-    fn elements(&self, cube: &Cube<'_>) -> Elements {
-        cube.elements(self.kind, self.cells, self.law, self.poisson_ratio)
+    fn model<'a>(&self, cube: &'a Cube<'a>) -> Result<Model<'a>> {
+        self.method.model(cube, self.cells, self.law, self.poisson_ratio)
     }
 
-    fn run(&self, cube: &Cube<'_>, beads: &Beads) -> CubeRow {
-        let elements = self.elements(cube);
+    fn run(&self, cube: &Cube<'_>, beads: &Beads) -> Result<CubeRow> {
+        let model = self.model(cube)?;
         let (mut median_mm, mut rms_mm) = (ByStrain::new(), ByStrain::new());
         for strain in &beads.strains {
             // A law may have no equilibrium there: St. Venant-Kirchhoff tissue gives way when
             // pressed.
-            let Ok(predicted) = cube.predict(&elements, self.law, strain) else { continue };
+            let Ok(predicted) = model.predict(strain) else { continue };
             let [median, rms] = figures(distances(&predicted, strain));
             median_mm.insert(strain.percent.clone(), median);
             rms_mm.insert(strain.percent.clone(), rms);
         }
-        CubeRow {
-            elements: self.kind.name().to_owned(),
-            cell_mm: 80.0 / self.cells as f64,
-            nodes: elements.rest().len(),
+        Ok(CubeRow {
+            elements: self.method.name().to_owned(),
+            cell_mm: model.cell_mm,
+            nodes: model.nodes,
             law: self.law.name().to_owned(),
             poisson_ratio: self.poisson_ratio,
             median_mm,
             rms_mm,
-        }
+        })
     }
 }
