@@ -144,3 +144,35 @@ impl Points<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::data::tests::rough_plates;
+    use super::super::method::Method;
+    use super::*;
+
+    /// Brought to rest, the solver of the cell has the beads where the static equilibrium of the
+    /// same elements has them: the lattice does not lock there either, and tetrahedra do.
+    #[test]
+    fn the_stepped_cube_rests_where_statics_put_it() {
+        let beads = rough_plates();
+        let (cube, strain) = (Cube::new(&beads), &beads.strains[0]);
+        let law = Law::Finite(ConstitutiveModel::StableNeoHookean);
+        let place = |method: Method| method.model(&cube, 6, law, 0.499).unwrap().predict(strain).unwrap();
+        let judge = place(Method::Tetrahedra(Kind::Quadratic));
+        let median = |places: &[DVec3]| {
+            let mut off: Vec<f64> = places.iter().zip(&judge).map(|(a, b)| a.distance(*b)).collect();
+            crate::statistics::median(&mut off)
+        };
+        for (stepped, resting, bars) in [
+            (Method::SteppedTetrahedra, Method::Tetrahedra(Kind::Linear), [0.0, f64::INFINITY]),
+            (Method::SteppedLattice, Method::Lattice, [0.0, f64::INFINITY]),
+        ] {
+            let [stepped, resting] = [stepped, resting].map(place);
+            let off = stepped.iter().zip(&resting).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+            println!("{off:.2e} m from statics, {:.2e} m from quadratic tetrahedra", median(&stepped));
+            assert!(off < 1.0);
+            assert!((bars[0]..bars[1]).contains(&median(&stepped)));
+        }
+    }
+}
