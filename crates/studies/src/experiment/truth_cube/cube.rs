@@ -303,13 +303,18 @@ mod tests {
         let beads = Beads::read(&path).unwrap();
         let cube = Cube::new(&beads);
         let law = Law::Finite(ConstitutiveModel::StableNeoHookean);
-        let elements = cube.elements(Kind::Linear, 6, law, 0.49);
-        for (strain, bar) in beads.strains.iter().zip([0.33e-3, 0.51e-3]) {
-            let mut errors = distances(&cube.predict(&elements, law, strain).unwrap(), strain);
-            let error = crate::statistics::median(&mut errors);
-            let [(_, straight), ..] = guesses(&beads, strain);
-            let straight = crate::statistics::median(&mut distances(&straight, strain));
-            assert!(error < bar && error < straight, "{}%: {error} m, straight columns {straight} m", strain.percent);
+        for (method, cells, poisson_ratio, bars) in [
+            (Method::Tetrahedra(Kind::Linear), 6, 0.49, [0.33e-3, 0.51e-3]),
+            (Method::Lattice, 4, 0.499, [0.27e-3, 0.32e-3]),
+        ] {
+            let model = method.model(&cube, cells, law, poisson_ratio).unwrap();
+            for (strain, bar) in beads.strains.iter().zip(bars) {
+                let error = crate::statistics::median(&mut distances(&model.predict(strain).unwrap(), strain));
+                let [(_, straight), ..] = guesses(&beads, strain);
+                let straight = crate::statistics::median(&mut distances(&straight, strain));
+                let what = format!("{method:?}, {}%: {error} m, straight columns {straight} m", strain.percent);
+                assert!(error < bar && error < straight, "{what}");
+            }
         }
     }
 }

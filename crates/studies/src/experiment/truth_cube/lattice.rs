@@ -5,7 +5,7 @@
 //! the cube need not coincide with the grid: they pass through the outermost cells, of which at
 //! least half is tissue.
 
-use super::cube::{Cube, DENSITY, Law, YOUNG_MODULUS, inner};
+use super::cube::{Cube, DENSITY, Law, YOUNG_MODULUS};
 use super::data::Strain;
 use crate::{Error, Result};
 use glam::DVec3;
@@ -23,6 +23,7 @@ const PLANE: f64 = 1e-9;
 pub(super) struct LatticeCube<'a> {
     cube: &'a Cube<'a>,
     body: Body,
+    /// What divides the cube.
     pub planes: Planes,
     /// The beads of the inner layers.
     beads: Vec<EmbeddedPoint>,
@@ -78,7 +79,6 @@ impl<'a> LatticeCube<'a> {
             state.positions.iter_mut().zip(&way).for_each(|(x, way)| *x += *way / PARTS as f64);
             newton.settle(&self.body, &Conditions::default(), &mut state).map_err(refused)?;
         }
-        debug_assert_eq!(self.beads.len(), inner().count());
         Ok(self.beads.iter().map(|bead| bead.interpolate(&state.positions)).collect())
     }
 }
@@ -116,6 +116,6 @@ impl Planes {
     }
 }
 
-pub(super) fn refused(error: trocar_lattice::Error) -> Error {
+fn refused(error: trocar_lattice::Error) -> Error {
     Error::Study(error.into())
 }
