@@ -118,6 +118,15 @@ pub(super) mod tests {
         text
     }
 
+    /// A cube between plates to which it sticks, 10% nearer to each other. Where the beads between
+    /// go is not known.
+    pub fn rough_plates() -> Beads {
+        let mut beads = Beads::parse(&table()).unwrap();
+        let at = beads.rest.iter().map(|p| *p * DVec3::new(1.0, 1.0, 0.9)).collect();
+        beads.strains = vec![Strain { percent: "10".to_owned(), at }];
+        beads
+    }
+
     #[test]
     fn beads_are_read_by_layer() {
         let beads = Beads::parse(&table()).unwrap();

@@ -7,7 +7,7 @@ use glam::DVec3;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
-use trocar_report::table::{count, fixed};
+use trocar_report::table::{count, fixed, or_dash};
 
 /// Colours of beads where they were seen, and where they are predicted.
 const SEEN: [u8; 3] = [120, 126, 132];
@@ -18,7 +18,8 @@ pub(super) fn document(beads: &Beads, r: &TruthCubeResult) -> Result<Document> {
     let lead = "Beads in a cube of silicone of 80 mm between two rough plates. The outermost layers of beads go where \
                 they were seen, as cubic polynomials; the beads of the five inner layers are predicted. Distances \
                 between where a bead is predicted and where it was seen. Noise: distance of the outer beads from the \
-                polynomials.";
+                polynomials. Mesh: median distance from where quadratic tetrahedra in cells of 10 mm put the bead, by \
+                the same law and ratio.";
     let of = |by: &ByStrain, strain: &String| fixed(by.get(strain).copied().unwrap_or(f64::NAN), 2);
     let card = |strain: &&String| {
         let (straight, noise) = (of(&r.interpolation_error_mm, strain), of(&r.noise_mm, strain));
@@ -67,7 +68,9 @@ fn values(strains: &[&String], median: &ByStrain, rms: &ByStrain) -> Vec<String>
 }
 
 fn models(r: &TruthCubeResult, strains: &[&String]) -> Table {
-    let head = ["Elements", "Cell (mm)", "Nodes", "Law", "nu"].map(str::to_owned).into_iter().chain(columns(strains));
+    let mesh = strains.iter().map(|s| format!("Mesh at {s}% (mm)"));
+    let head = ["Elements", "Cell (mm)", "Nodes", "Law", "nu"].map(str::to_owned).into_iter();
+    let head = head.chain(columns(strains)).chain(mesh);
     let row = |row: &CubeRow| {
         let model = [
             row.elements.clone(),
@@ -76,7 +79,8 @@ fn models(r: &TruthCubeResult, strains: &[&String]) -> Table {
             row.law.clone(),
             row.poisson_ratio.to_string(),
         ];
-        model.into_iter().chain(values(strains, &row.median_mm, &row.rms_mm)).collect()
+        let mesh = strains.iter().map(|s| or_dash(row.mesh_mm.get(*s).copied(), 3));
+        model.into_iter().chain(values(strains, &row.median_mm, &row.rms_mm)).chain(mesh).collect()
     };
     Table::new(head, r.rows.iter().map(row).collect())
 }

@@ -13,9 +13,10 @@ pub type ByStrain = BTreeMap<String, f64>;
 /// The beads of the inner layers by one model of the cube.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CubeRow {
-    /// Kind of the elements: `linear`, `corrected`, `patches`, `quadratic`.
+    /// Kind of the elements: tetrahedra (`linear`, `corrected`, `patches`, `quadratic`) or `lattice`
+    /// in static equilibrium; `linear, stepped` and `lattice, stepped` by the solver of the cell.
     pub elements: String,
-    /// Edge of the cells, which are six tetrahedra each (mm).
+    /// Edge of the cells, which are six tetrahedra or a hexahedron each (mm).
     pub cell_mm: f64,
     /// Nodes.
     pub nodes: usize,
@@ -27,6 +28,10 @@ pub struct CubeRow {
     pub median_mm: ByStrain,
     /// Root of the mean square of these distances (mm).
     pub rms_mm: ByStrain,
+    /// Median distance between a bead and where quadratic tetrahedra in cells of 10 mm put it, by
+    /// the same law and ratio: the error of the mesh, without that of the measurement (mm). Empty
+    /// for other laws than stable neo-Hookean.
+    pub mesh_mm: ByStrain,
 }
 
 /// A guess without a model.
@@ -116,6 +121,17 @@ impl Law {
             Self::Finite(Model::StVenantKirchhoff) => "st-venant-kirchhoff",
             Self::Finite(Model::Corotated) => "corotated",
             Self::Linear => "linear-elasticity",
+            Self::Rotated => "rotated-linear",
+        }
+    }
+
+    /// The law of a lattice, if it has it.
+    pub fn of_lattice(self) -> Option<trocar_lattice::Law> {
+        use trocar_tissue::ConstitutiveModel as Model;
+        match self {
+            Self::Finite(Model::StableNeoHookean) => Some(trocar_lattice::Law::StableNeoHookean),
+            Self::Rotated => Some(trocar_lattice::Law::Corotated),
+            Self::Finite(Model::StVenantKirchhoff | Model::Corotated) | Self::Linear => None,
         }
     }
 }
