@@ -235,9 +235,9 @@ impl Island<'_> {
         direction
     }
 
-    /// A step that lowers the energy enough: the whole direction, or the part of it where a parabola
-    /// through the energies so far is lowest, between a tenth and half of the last trial (Nocedal
-    /// and Wright, section 3.5).
+    /// A step that lowers the energy enough: the whole direction, or the part of it where a
+    /// parabola through the energies so far is lowest, between a tenth and half of the last trial
+    /// (Nocedal and Wright, section 3.5).
     fn search(&self, direction: &[Vec<DVec3>], slope: f64, value: &Value) -> Option<(Vec<Vec<DVec3>>, Value, f64)> {
         if slope.is_nan() || slope >= 0.0 {
             return None;

@@ -33,7 +33,8 @@ pub(super) struct Model<'a> {
 type Predict<'a> = Box<dyn Fn(&Strain) -> Result<Vec<DVec3>> + 'a>;
 
 impl Method {
-    /// The model with `cells` cells of tetrahedra across the cube, or as many layers of a lattice's.
+    /// The model with `cells` cells of tetrahedra across the cube, or as many layers of a
+    /// lattice's.
     ///
     /// # Errors
     /// A law that the elements do not have.

@@ -13,8 +13,9 @@ pub type ByStrain = BTreeMap<String, f64>;
 /// The beads of the inner layers by one model of the cube.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CubeRow {
-    /// Kind of the elements: tetrahedra (`linear`, `corrected`, `patches`, `quadratic`) or `lattice`
-    /// in static equilibrium; `linear, stepped` and `lattice, stepped` by the solver of the cell.
+    /// Kind of the elements: tetrahedra (`linear`, `corrected`, `patches`, `quadratic`) or
+    /// `lattice` in static equilibrium; `linear, stepped` and `lattice, stepped` by the solver of
+    /// the cell.
     pub elements: String,
     /// Edge of the cells, which are six tetrahedra or a hexahedron each (mm).
     pub cell_mm: f64,
