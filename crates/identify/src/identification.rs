@@ -16,12 +16,15 @@ use trocar_geometry::Skin;
 use trocar_specimen::{Parameter, Posterior, Prior};
 
 /// Cells of the finer mesh over those of the coarse one.
-pub const FINER: f64 = 0.7;
+pub const FINER: f64 = 0.75;
 
 /// Simulated values a parameter: of the first round, from the prior, with the coarse mesh alone, and
-/// of each further round, with both meshes.
-const FIRST: usize = 16;
-const FURTHER: [usize; 3] = [4, 4, 4];
+/// of each further round, of which one in so many has the finer mesh too.
+const FIRST: usize = 14;
+const FURTHER: [(usize, usize); 5] = [(4, 3), (4, 3), (4, 3), (4, 2), (4, 2)];
+
+/// Draws among which those are chosen whose simulations tell most.
+const CANDIDATES: usize = 200;
 
 /// Walkers, and rounds of a walk: before draws are kept, in all, and between kept ones.
 const WALKERS: usize = 32;
@@ -83,8 +86,12 @@ impl Identification {
                 "the lifts have {landmarks} landmarks that are seen; there must be at least {LEAST_LANDMARKS}"
             )));
         }
-        let total = FIRST + 2 * FURTHER.iter().sum::<usize>();
-        progress.begin("simulated lifts", (total * self.priors.len() * self.lifts.len()) as u64);
+        let count = |(count, each): &(usize, usize)| {
+            let coarse = count * self.priors.len();
+            coarse + coarse / each
+        };
+        let total = FIRST * self.priors.len() + FURTHER.iter().map(count).sum::<usize>();
+        progress.begin("simulated lifts", (total * self.lifts.len()) as u64);
         let result = self.rounds(progress);
         progress.end();
         result
@@ -99,8 +106,8 @@ impl Identification {
         let (mut simulated, mut diverged, mut draws) = (0, 0, Vec::new());
         for round in 0..=FURTHER.len() {
             simulated += asked.len();
-            let meshes = if round == 0 { 1 } else { 2 };
-            let found = self.simulate(&asked, &bound[..meshes], progress)?;
+            let each = if round == 0 { usize::MAX } else { FURTHER[round - 1].1 };
+            let found = self.simulate(&asked, each, &bound, progress)?;
             diverged += found.iter().filter(|p| p.is_none()).count();
             points.extend(found.into_iter().flatten());
             if points.len() < 2 * self.priors.len() {
@@ -111,11 +118,16 @@ impl Identification {
             if let Some(rows) = pull_errors(&organ, &self.lifts, &bound[0], progress)? {
                 likelihood.with_pull_errors(&rows);
             }
-            draws = self.explore(&points, &likelihood, random.stream(10 + round as u64))?;
-            if let Some(count) = FURTHER.get(round) {
-                let pick = random.stream(20 + round as u64);
-                let one = |i: usize| ((pick.uniform(i as u64) * draws.len() as f64) as usize).min(draws.len() - 1);
-                asked = (0..count * self.priors.len()).map(|i| draws[one(i)][..self.priors.len()].to_vec()).collect();
+            let surrogate =
+                Surrogate::through(&points).ok_or_else(|| Error::Lifts("all simulated lifts are alike".to_owned()))?;
+            let walk = |log: &dyn Fn(&Prediction, f64) -> f64| {
+                self.explore(&points, &likelihood, &surrogate, random.stream(10 + round as u64), log)
+            };
+            if let Some((count, _)) = FURTHER.get(round) {
+                let open = walk(&|predicted, error| likelihood.in_question(predicted, error));
+                asked = self.next(&open, &surrogate, count * self.priors.len(), random.stream(20 + round as u64));
+            } else {
+                draws = walk(&|predicted, error| likelihood.log(predicted, error));
             }
         }
         self.conclude(&points, &likelihood, &draws, [simulated, diverged])
@@ -137,25 +149,43 @@ impl Identification {
         points
     }
 
-    /// The numbers of all lifts at these scores, with the coarse mesh or with both; `None` where a
-    /// lift diverged.
-    fn simulate(&self, asked: &[Vec<f64>], bound: &[Vec<Skin>], progress: &dyn Progress) -> Result<Vec<Option<Point>>> {
-        let one = |scores: &Vec<f64>| -> Result<Option<Point>> {
-            let mut numbers = Vec::new();
-            for (organ, bound) in [&self.organ, &self.finer].into_iter().zip(bound) {
-                let Some(found) = self.simulate_one(organ, scores, bound, progress)? else { return Ok(None) };
-                numbers.push(found);
+    /// The points of the next round: half of them as drawn, half of them those that tell most.
+    fn next(&self, draws: &[Vec<f64>], surrogate: &Surrogate, count: usize, random: Random) -> Vec<Vec<f64>> {
+        let one = |i: usize| ((random.uniform(i as u64) * draws.len() as f64) as usize).min(draws.len() - 1);
+        let drawn = |i: usize| draws[one(i)][..self.priors.len()].to_vec();
+        let (half, candidates) = (count / 2, (0..CANDIDATES).map(drawn).collect::<Vec<_>>());
+        let told = surrogate.most_uncertain(&candidates[half..], count - half);
+        // In turns, so that those as drawn are simulated with the finer mesh.
+        let mut told = told.into_iter().map(|k| candidates[half + k].clone());
+        let turns = candidates[..half].iter().flat_map(|drawn| told.next().into_iter().chain([drawn.clone()]));
+        let mut points: Vec<Vec<f64>> = turns.collect();
+        points.extend(told);
+        points
+    }
+
+    /// The numbers of all lifts at these scores, and one in `each` with the finer mesh too; `None`
+    /// where a lift diverged.
+    fn simulate(
+        &self,
+        asked: &[Vec<f64>],
+        each: usize,
+        [coarse, finer]: &[Vec<Skin>; 2],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Option<Point>>> {
+        let one = |(k, scores): (usize, &Vec<f64>)| -> Result<Option<Point>> {
+            let Some(numbers) = self.simulate_one(&self.organ, scores, coarse, progress)? else { return Ok(None) };
+            let mut point = Point { scores: scores.clone(), coarse: numbers, finer: None };
+            if (k + 1) % each == 0 {
+                point.finer = self.simulate_one(&self.finer, scores, finer, progress)?;
             }
-            let mut numbers = numbers.into_iter();
-            let Some(coarse) = numbers.next() else { return Ok(None) };
-            Ok(Some(Point { scores: scores.clone(), coarse, finer: numbers.next() }))
+            Ok(Some(point))
         };
         // A pool of one thread would let a caller's pool begin other work meanwhile.
         if self.threads == 1 {
-            return asked.iter().map(one).collect();
+            return asked.iter().enumerate().map(one).collect();
         }
         let pool = trocar_core::thread_pool(self.threads).map_err(Error::Lifts)?;
-        pool.install(|| asked.par_iter().map(one).collect())
+        pool.install(|| asked.par_iter().enumerate().map(one).collect())
     }
 
     fn simulate_one(
@@ -178,15 +208,20 @@ impl Identification {
         Ok(Some(numbers))
     }
 
-    /// Draws from the posterior, as far as the simulated points tell it: scores of the parameters
-    /// and of the model's error.
-    fn explore(&self, points: &[Point], likelihood: &Likelihood, random: Random) -> Result<Vec<Vec<f64>>> {
-        let surrogate =
-            Surrogate::through(points).ok_or_else(|| Error::Lifts("all simulated lifts are alike".to_owned()))?;
+    /// Draws from the distribution of which `log` is the logarithm of what the lifts make of it, as
+    /// far as the simulated points tell: scores of the parameters and of the model's error.
+    fn explore(
+        &self,
+        points: &[Point],
+        likelihood: &Likelihood,
+        surrogate: &Surrogate,
+        random: Random,
+        log: &dyn Fn(&Prediction, f64) -> f64,
+    ) -> Vec<Vec<f64>> {
         let log = |scores: &[f64]| {
             let (parameters, error) = scores.split_at(self.priors.len());
             let prior: f64 = -0.5 * scores.iter().map(|s| s * s).sum::<f64>();
-            prior + likelihood.log(&surrogate.at(parameters), error[0])
+            prior + log(&surrogate.at(parameters), error[0])
         };
         // The walkers begin at the best simulated points.
         let mut ranked: Vec<(f64, &Point)> = points.iter().map(|p| (self.log_at(p, likelihood), p)).collect();
@@ -199,7 +234,7 @@ impl Identification {
             scores.chain([0.3 * own.normal(99)]).collect()
         };
         let starts: Vec<Vec<f64>> = (0..WALKERS).map(start).collect();
-        Ok(walk(&starts, WALK, random, log))
+        walk(&starts, WALK, random, log)
     }
 
     /// Logarithm of the posterior at a simulated point with the likeliest error of the model.

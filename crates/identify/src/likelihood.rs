@@ -81,16 +81,31 @@ impl Likelihood {
 
     /// Logarithm of the likelihood, without a constant, if the model's error has this score.
     pub fn log(&self, predicted: &Prediction, error_score: f64) -> f64 {
+        let [distance, determinant] = self.parts(predicted, predicted.variance, error_score);
+        -0.5 * (distance + determinant)
+    }
+
+    /// The same as if nothing were known for being uncertain: values stay in question until their
+    /// simulation is known well enough to rule them out.
+    pub fn in_question(&self, predicted: &Prediction, error_score: f64) -> f64 {
+        let [distance, _] = self.parts(predicted, predicted.variance, error_score);
+        let [_, determinant] = self.parts(predicted, 0.0, error_score);
+        -0.5 * (distance + determinant)
+    }
+
+    /// The squared distance of the measured from predicted lifts in deviations, and the logarithm of
+    /// the determinant of their covariance, if the prediction has this variance.
+    fn parts(&self, predicted: &Prediction, variance: f64, error_score: f64) -> [f64; 2] {
         let error = Self::model_error(error_score);
         let covariance = |i: usize, j: usize| {
             let ((a, x, way_a), (b, y, way_b)) = (self.places[i], self.places[j]);
             let shared = if a == b { 1.0 } else { COMMON };
             let alike = (-(x - y).abs() / ALIKE).exp();
             let own = if i == j { TRACKER * TRACKER } else { 0.0 };
-            own + (error * error * way_a * way_b * shared + predicted.variance) * alike
+            own + (error * error * way_a * way_b * shared + variance) * alike
         };
-        let Some(factor) = Factor::of(self.places.len(), covariance) else { return f64::NEG_INFINITY };
-        let mut log = -1.5 * factor.log_determinant();
+        let Some(factor) = Factor::of(self.places.len(), covariance) else { return [f64::INFINITY; 2] };
+        let (mut total, mut determinant) = (0.0, 3.0 * factor.log_determinant());
         // The errors of the pulls have few directions U: by Woodbury's formula the inverse of
         // K + U U' needs the factor of 1 + U' K^-1 U alone.
         let (landmarks, pulls) = (self.places.len(), self.pulls.len());
@@ -98,7 +113,7 @@ impl Likelihood {
         for axis in 0..3 {
             let off = self.measured[axis].iter().zip(&self.at).map(|(m, at)| m - predicted.mean[at + axis]);
             let mut off: Vec<f64> = off.collect();
-            log -= 0.5 * factor.distance(&mut off);
+            total += factor.distance(&mut off);
             let scaled = |(first, moved): &(usize, [Vec<f64>; 3])| {
                 let mut scaled = vec![0.0; landmarks];
                 scaled[*first..].copy_from_slice(&moved[axis]);
@@ -112,18 +127,20 @@ impl Likelihood {
             }
         }
         let own = |i: usize, j: usize| square[i * pulls + j] + if i == j { 1.0 } else { 0.0 };
-        let Some(factor) = Factor::of(pulls, own) else { return f64::NEG_INFINITY };
-        log += 0.5 * (factor.distance(&mut along) - factor.log_determinant());
+        let Some(factor) = Factor::of(pulls, own) else { return [f64::INFINITY; 2] };
+        total -= factor.distance(&mut along);
+        determinant += factor.log_determinant();
         for (at, force) in &self.forces {
-            let spread = predicted.variance / (PER_NEWTON * PER_NEWTON);
+            let spread = variance / (PER_NEWTON * PER_NEWTON);
             let noise = (FORCE_SHARE + error) * force.length();
             let variance = noise * noise + FORCE_NOISE * FORCE_NOISE + spread;
             for axis in 0..3 {
                 let off = force[axis] - predicted.mean[at + axis] / PER_NEWTON;
-                log -= 0.5 * (off * off / variance + variance.ln());
+                total += off * off / variance;
+                determinant += variance.ln();
             }
         }
-        log
+        [total, determinant]
     }
 }
 

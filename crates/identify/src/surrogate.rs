@@ -50,4 +50,9 @@ impl Surrogate {
         }
         found
     }
+
+    /// Those `count` of some candidates whose coarse simulations tell most.
+    pub fn most_uncertain(&self, candidates: &[Vec<f64>], count: usize) -> Vec<usize> {
+        self.coarse.most_uncertain(candidates, count)
+    }
 }
