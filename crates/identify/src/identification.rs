@@ -26,9 +26,11 @@ const FURTHER: [(usize, usize); 5] = [(4, 3), (4, 3), (4, 3), (4, 2), (4, 2)];
 /// Draws among which those are chosen whose simulations tell most.
 const CANDIDATES: usize = 200;
 
-/// Walkers, and rounds of a walk: before draws are kept, in all, and between kept ones.
+/// Walkers, and rounds of a walk: before draws are kept, in all, and between kept ones; of the last
+/// walk, and of those that choose what is simulated next.
 const WALKERS: usize = 32;
 const WALK: [usize; 3] = [250, 650, 8];
+const SEARCH: [usize; 3] = [150, 350, 8];
 
 /// Fewest landmarks of all lifts.
 const LEAST_LANDMARKS: usize = 6;
@@ -120,14 +122,15 @@ impl Identification {
             }
             let surrogate =
                 Surrogate::through(&points).ok_or_else(|| Error::Lifts("all simulated lifts are alike".to_owned()))?;
-            let walk = |log: &dyn Fn(&Prediction, f64) -> f64| {
-                self.explore(&points, &likelihood, &surrogate, random.stream(10 + round as u64), log)
+            let walk = |rounds: [usize; 3], log: &dyn Fn(&Prediction, f64) -> f64| {
+                let starts = self.starts(&points, &likelihood, random.stream(10 + round as u64));
+                self.explore(&starts, &surrogate, rounds, random.stream(10 + round as u64), log)
             };
             if let Some((count, _)) = FURTHER.get(round) {
-                let open = walk(&|predicted, error| likelihood.in_question(predicted, error));
+                let open = walk(SEARCH, &|predicted, error| likelihood.in_question(predicted, error));
                 asked = self.next(&open, &surrogate, count * self.priors.len(), random.stream(20 + round as u64));
             } else {
-                draws = walk(&|predicted, error| likelihood.log(predicted, error));
+                draws = walk(WALK, &|predicted, error| likelihood.log(predicted, error));
             }
         }
         self.conclude(&points, &likelihood, &draws, [simulated, diverged])
@@ -212,9 +215,9 @@ impl Identification {
     /// far as the simulated points tell: scores of the parameters and of the model's error.
     fn explore(
         &self,
-        points: &[Point],
-        likelihood: &Likelihood,
+        starts: &[Vec<f64>],
         surrogate: &Surrogate,
+        rounds: [usize; 3],
         random: Random,
         log: &dyn Fn(&Prediction, f64) -> f64,
     ) -> Vec<Vec<f64>> {
@@ -223,7 +226,11 @@ impl Identification {
             let prior: f64 = -0.5 * scores.iter().map(|s| s * s).sum::<f64>();
             prior + log(&surrogate.at(parameters), error[0])
         };
-        // The walkers begin at the best simulated points.
+        walk(starts, rounds, random, log)
+    }
+
+    /// Where walkers begin: at the best simulated points.
+    fn starts(&self, points: &[Point], likelihood: &Likelihood, random: Random) -> Vec<Vec<f64>> {
         let mut ranked: Vec<(f64, &Point)> = points.iter().map(|p| (self.log_at(p, likelihood), p)).collect();
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
         let start = |k: usize| -> Vec<f64> {
@@ -233,8 +240,7 @@ impl Identification {
             let scores = point.scores.iter().enumerate().map(|(d, s)| s + jitter(d));
             scores.chain([0.3 * own.normal(99)]).collect()
         };
-        let starts: Vec<Vec<f64>> = (0..WALKERS).map(start).collect();
-        walk(&starts, WALK, random, log)
+        (0..WALKERS).map(start).collect()
     }
 
     /// Logarithm of the posterior at a simulated point with the likeliest error of the model.
