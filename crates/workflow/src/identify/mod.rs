@@ -29,7 +29,7 @@ pub struct Identifying {
     pub organ: Option<String>,
     /// Numbers of the lifts; all if empty.
     pub lifts: Vec<usize>,
-    /// Cells of the mesh in which lifts are simulated (m).
+    /// Cells of the coarse mesh in which lifts are simulated (m); the finer one follows from it.
     pub cell: f64,
     /// Seed of the draws.
     pub seed: u64,
