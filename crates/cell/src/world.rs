@@ -260,8 +260,8 @@ fn support_under(organ: &Organ, up: DVec3, friction: f64) -> Result<Support> {
     Ok(SupportField::under(&organ.body, up, cell, friction)?.into())
 }
 
-/// The threads that hold an organ: from the lowest nodes of the part that they hold to where these
-/// were recorded.
+/// The threads that hold an organ: from the lowest nodes along it to where these were recorded. The
+/// nodes do not depend on which part is held: so the threads' force changes evenly with it.
 fn tethers_of(organ: &Organ, axis: &OrganAxis, up: DVec3) -> Vec<Tether> {
     let Some(Threads { from, to, slack_m, stiffness_n_m2 }) = organ.threads else { return Vec::new() };
     let nodes = &organ.body.vertices;
@@ -270,13 +270,21 @@ fn tethers_of(organ: &Organ, axis: &OrganAxis, up: DVec3) -> Vec<Tether> {
     let mut s = vec![f64::NAN; nodes.len()];
     organ.body.boundary().1.iter().for_each(|i| s[*i as usize] = axis.s[*i as usize]);
     pinned_nodes(organ, axis, up).iter().for_each(|i| s[*i as usize] = f64::NAN);
-    let thread = |(node, step): (u32, f64)| Tether {
+    let lowest = pins::lowest_along(nodes, &s, up, [0.0, 1.0], spacing);
+    let mut places: Vec<(f64, u32)> = lowest.into_iter().map(|(node, _)| (s[node as usize], node)).collect();
+    places.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // A node may be the lowest of two slices.
+    places.dedup_by(|a, b| a.0 == b.0);
+    let along: Vec<f64> = places.iter().map(|p| p.0).collect();
+    let borne = pins::borne(&along, [from, to], 0.5 * spacing);
+    let held = places.into_iter().zip(borne).filter(|(_, borne)| *borne > 0.0);
+    let thread = |((_, node), borne): ((f64, u32), f64)| Tether {
         node,
         anchor: nodes[node as usize],
         length: slack_m,
-        stiffness: stiffness_n_m2 * step * axis.length,
+        stiffness: stiffness_n_m2 * borne * axis.length,
     };
-    pins::lowest_along(nodes, &s, up, [from, to], spacing).into_iter().map(thread).collect()
+    held.map(thread).collect()
 }
 
 /// The tissue of an organ.

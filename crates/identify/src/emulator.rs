@@ -1,12 +1,13 @@
 //! A Gaussian process through simulated lifts: it stands in for the simulation while the posterior
 //! is explored (M. C. Kennedy, A. O'Hagan, "Bayesian calibration of computer models", 2001).
 //!
-//! All numbers of the lifts share one kernel: a constant, a linear part, and a squared exponential
-//! with a length for each parameter. The lengths and the nugget maximise the likelihood.
+//! All numbers of the lifts share one kernel: a constant, a linear part, and Matern's with 5/2 and a
+//! length for each parameter, because lifts have kinks where threads become taut. The lengths and
+//! the nugget maximise the likelihood.
 
 use crate::dense::{Factor, dot};
 
-/// Variances of the constant and the linear part, over that of the squared exponential.
+/// Variances of the constant and the linear part, over that of Matern's part.
 const CONSTANT: f64 = 10.0;
 const LINEAR: f64 = 1.0;
 
@@ -36,7 +37,7 @@ pub(crate) struct Emulator {
     /// K^-1 y, one row a number.
     weights: Vec<Vec<f64>>,
     offset: Vec<f64>,
-    /// Variance of the squared exponential.
+    /// Variance of Matern's part.
     amplitude: f64,
 }
 
@@ -61,7 +62,8 @@ impl Kernel {
             distance += apart * apart;
             linear += a[k] * b[k];
         }
-        CONSTANT + LINEAR * linear + (-0.5 * distance).exp()
+        let apart = (5.0 * distance).sqrt();
+        CONSTANT + LINEAR * linear + (1.0 + apart + apart * apart / 3.0) * (-apart).exp()
     }
 
     fn factor(&self, points: &[Vec<f64>]) -> Option<Factor> {
@@ -130,6 +132,31 @@ impl Emulator {
         let variance = self.amplitude * (own - self.factor.distance(&mut kernel)).max(0.0);
         Prediction { mean, variance }
     }
+
+    /// Those `count` of some candidates that tell most about all: each has the largest variance that
+    /// simulations of those before it would leave.
+    pub fn most_uncertain(&self, candidates: &[Vec<f64>], count: usize) -> Vec<usize> {
+        let row = |c: &Vec<f64>| {
+            let mut row: Vec<f64> = self.points.iter().map(|p| self.kernel.at(p, c)).collect();
+            self.factor.forward(&mut row);
+            row
+        };
+        let mut rows: Vec<Vec<f64>> = candidates.iter().map(row).collect();
+        let mut left: Vec<f64> = candidates.iter().zip(&rows).map(|(c, r)| self.kernel.at(c, c) - dot(r, r)).collect();
+        let mut chosen = Vec::new();
+        while chosen.len() < count.min(candidates.len()) {
+            let free = (0..left.len()).filter(|i| !chosen.contains(i));
+            let Some(next) = free.max_by(|a, b| left[*a].total_cmp(&left[*b])) else { break };
+            let (own, pivot) = (rows[next].clone(), (left[next].max(0.0) + self.kernel.nugget).sqrt());
+            for (j, row) in rows.iter_mut().enumerate() {
+                let told = (self.kernel.at(&candidates[next], &candidates[j]) - dot(&own, row)) / pivot;
+                row.push(told);
+                left[j] -= told * told;
+            }
+            chosen.push(next);
+        }
+        chosen
+    }
 }
 
 #[cfg(test)]
@@ -151,5 +178,17 @@ mod tests {
             assert!(off < 0.05, "{off} at {at:?}");
             assert!(off < 5.0 * predicted.variance.sqrt() + 1e-3);
         }
+    }
+
+    #[test]
+    fn what_is_far_from_points_and_from_each_other_is_chosen() {
+        let random = Random::from_keys(&[4]);
+        let points: Vec<Vec<f64>> = (0..40).map(|i| (0..2).map(|k| random.stream(k).normal(i)).collect()).collect();
+        let values: Vec<Vec<f64>> = points.iter().map(|p| vec![(2.0 * p[0]).sin() * p[1]]).collect();
+        let emulator = Emulator::through(&points, &values).unwrap();
+        let candidates = vec![points[3].clone(), vec![4.0, 4.0], vec![4.1, 4.0], vec![-3.5, 3.0], points[7].clone()];
+        let mut chosen = emulator.most_uncertain(&candidates, 2);
+        chosen.sort_unstable();
+        assert!(chosen == [1, 3] || chosen == [2, 3], "{chosen:?}");
     }
 }

@@ -1,11 +1,13 @@
 //! Identification: rounds of simulated lifts, each nearer to the measured ones.
 
-use crate::emulator::{Emulator, Prediction};
+use crate::emulator::Prediction;
 use crate::left_open::left_open;
 use crate::likelihood::Likelihood;
 use crate::lone_organ::{LoneOrgan, Pace};
 use crate::observation::Observation;
+use crate::pull_error::pull_errors;
 use crate::quantile::normal_quantile;
+use crate::surrogate::{Point, Surrogate};
 use crate::walkers::walk;
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -13,13 +15,22 @@ use trocar_core::{Progress, Random};
 use trocar_geometry::Skin;
 use trocar_specimen::{Parameter, Posterior, Prior};
 
-/// Simulated values a parameter: of the first round, from the prior, and of each further round.
-const FIRST: usize = 16;
-const FURTHER: [usize; 2] = [8, 8];
+/// Cells of the finer mesh over those of the coarse one.
+pub const FINER: f64 = 0.75;
 
-/// Walkers, and rounds of a walk: before draws are kept, in all, and between kept ones.
+/// Simulated values a parameter: of the first round, from the prior, with the coarse mesh alone, and
+/// of each further round, of which one in so many has the finer mesh too.
+const FIRST: usize = 14;
+const FURTHER: [(usize, usize); 5] = [(4, 3), (4, 3), (4, 3), (4, 2), (4, 2)];
+
+/// Draws among which those are chosen whose simulations tell most.
+const CANDIDATES: usize = 200;
+
+/// Walkers, and rounds of a walk: before draws are kept, in all, and between kept ones; of the last
+/// walk, and of those that choose what is simulated next.
 const WALKERS: usize = 32;
 const WALK: [usize; 3] = [250, 650, 8];
+const SEARCH: [usize; 3] = [150, 350, 8];
 
 /// Fewest landmarks of all lifts.
 const LEAST_LANDMARKS: usize = 6;
@@ -27,8 +38,10 @@ const LEAST_LANDMARKS: usize = 6;
 /// What to identify, from what.
 #[derive(Clone, Debug)]
 pub struct Identification {
-    /// The organ alone, in the mesh in which it is simulated.
+    /// The organ alone, in the coarse mesh in which it is simulated most often.
     pub organ: LoneOrgan,
+    /// The same in the mesh that the values are to hold for, with cells [`FINER`] times as long.
+    pub finer: LoneOrgan,
     /// The lifts.
     pub lifts: Vec<Observation>,
     /// The parameters with their ranges.
@@ -58,12 +71,6 @@ pub struct Identified {
     pub diverged: usize,
 }
 
-/// A simulated point: its scores and the numbers of all lifts.
-struct Point {
-    scores: Vec<f64>,
-    numbers: Vec<f64>,
-}
-
 impl Identification {
     /// Values of scores.
     pub fn values(&self, scores: &[f64]) -> Vec<(Parameter, f64)> {
@@ -81,7 +88,11 @@ impl Identification {
                 "the lifts have {landmarks} landmarks that are seen; there must be at least {LEAST_LANDMARKS}"
             )));
         }
-        let total = (FIRST + FURTHER.iter().sum::<usize>()) * self.priors.len();
+        let count = |(count, each): &(usize, usize)| {
+            let coarse = count * self.priors.len();
+            coarse + coarse / each
+        };
+        let total = FIRST * self.priors.len() + FURTHER.iter().map(count).sum::<usize>();
         progress.begin("simulated lifts", (total * self.lifts.len()) as u64);
         let result = self.rounds(progress);
         progress.end();
@@ -90,24 +101,36 @@ impl Identification {
 
     fn rounds(&self, progress: &dyn Progress) -> Result<Identified> {
         let random = Random::from_keys(&[self.seed, 401]);
-        let likelihood = Likelihood::of(&self.lifts);
-        let bound: Vec<Skin> = self.lifts.iter().map(|lift| lift.bound(&self.organ)).collect();
+        let mut likelihood = Likelihood::of(&self.lifts);
+        let bound = [&self.organ, &self.finer].map(|organ| self.lifts.iter().map(|l| l.bound(organ)).collect());
         let mut points: Vec<Point> = Vec::new();
         let mut asked = self.spread(random.stream(1));
         let (mut simulated, mut diverged, mut draws) = (0, 0, Vec::new());
         for round in 0..=FURTHER.len() {
             simulated += asked.len();
-            let found = self.simulate(&asked, &bound, progress)?;
+            let each = if round == 0 { usize::MAX } else { FURTHER[round - 1].1 };
+            let found = self.simulate(&asked, each, &bound, progress)?;
             diverged += found.iter().filter(|p| p.is_none()).count();
             points.extend(found.into_iter().flatten());
             if points.len() < 2 * self.priors.len() {
                 return Err(Error::Lifts(format!("{diverged} of {simulated} simulated lifts diverged")));
             }
-            draws = self.explore(&points, &likelihood, random.stream(10 + round as u64))?;
-            if let Some(count) = FURTHER.get(round) {
-                let pick = random.stream(20 + round as u64);
-                let one = |i: usize| ((pick.uniform(i as u64) * draws.len() as f64) as usize).min(draws.len() - 1);
-                asked = (0..count * self.priors.len()).map(|i| draws[one(i)][..self.priors.len()].to_vec()).collect();
+            let best = self.best(&points, &likelihood)?;
+            let organ = self.organ.with(|organ| Posterior::apply(&self.values(&best.scores), organ));
+            if let Some(rows) = pull_errors(&organ, &self.lifts, &bound[0], progress)? {
+                likelihood.with_pull_errors(&rows);
+            }
+            let surrogate =
+                Surrogate::through(&points).ok_or_else(|| Error::Lifts("all simulated lifts are alike".to_owned()))?;
+            let walk = |rounds: [usize; 3], log: &dyn Fn(&Prediction, f64) -> f64| {
+                let starts = self.starts(&points, &likelihood, random.stream(10 + round as u64));
+                self.explore(&starts, &surrogate, rounds, random.stream(10 + round as u64), log)
+            };
+            if let Some((count, _)) = FURTHER.get(round) {
+                let open = walk(SEARCH, &|predicted, error| likelihood.in_question(predicted, error));
+                asked = self.next(&open, &surrogate, count * self.priors.len(), random.stream(20 + round as u64));
+            } else {
+                draws = walk(WALK, &|predicted, error| likelihood.log(predicted, error));
             }
         }
         self.conclude(&points, &likelihood, &draws, [simulated, diverged])
@@ -129,20 +152,54 @@ impl Identification {
         points
     }
 
-    /// The numbers of all lifts at these scores; `None` where a lift diverged.
-    fn simulate(&self, asked: &[Vec<f64>], bound: &[Skin], progress: &dyn Progress) -> Result<Vec<Option<Point>>> {
-        let one = |scores: &Vec<f64>| self.simulate_one(scores, bound, progress);
-        // A pool of one thread would let a caller's pool begin other work meanwhile.
-        if self.threads == 1 {
-            return asked.iter().map(one).collect();
-        }
-        let pool = trocar_core::thread_pool(self.threads).map_err(Error::Lifts)?;
-        pool.install(|| asked.par_iter().map(one).collect())
+    /// The points of the next round: half of them as drawn, half of them those that tell most.
+    fn next(&self, draws: &[Vec<f64>], surrogate: &Surrogate, count: usize, random: Random) -> Vec<Vec<f64>> {
+        let one = |i: usize| ((random.uniform(i as u64) * draws.len() as f64) as usize).min(draws.len() - 1);
+        let drawn = |i: usize| draws[one(i)][..self.priors.len()].to_vec();
+        let (half, candidates) = (count / 2, (0..CANDIDATES).map(drawn).collect::<Vec<_>>());
+        let told = surrogate.most_uncertain(&candidates[half..], count - half);
+        // In turns, so that those as drawn are simulated with the finer mesh.
+        let mut told = told.into_iter().map(|k| candidates[half + k].clone());
+        let turns = candidates[..half].iter().flat_map(|drawn| told.next().into_iter().chain([drawn.clone()]));
+        let mut points: Vec<Vec<f64>> = turns.collect();
+        points.extend(told);
+        points
     }
 
-    fn simulate_one(&self, scores: &[f64], bound: &[Skin], progress: &dyn Progress) -> Result<Option<Point>> {
+    /// The numbers of all lifts at these scores, and one in `each` with the finer mesh too; `None`
+    /// where a lift diverged.
+    fn simulate(
+        &self,
+        asked: &[Vec<f64>],
+        each: usize,
+        [coarse, finer]: &[Vec<Skin>; 2],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Option<Point>>> {
+        let one = |(k, scores): (usize, &Vec<f64>)| -> Result<Option<Point>> {
+            let Some(numbers) = self.simulate_one(&self.organ, scores, coarse, progress)? else { return Ok(None) };
+            let mut point = Point { scores: scores.clone(), coarse: numbers, finer: None };
+            if (k + 1) % each == 0 {
+                point.finer = self.simulate_one(&self.finer, scores, finer, progress)?;
+            }
+            Ok(Some(point))
+        };
+        // A pool of one thread would let a caller's pool begin other work meanwhile.
+        if self.threads == 1 {
+            return asked.iter().enumerate().map(one).collect();
+        }
+        let pool = trocar_core::thread_pool(self.threads).map_err(Error::Lifts)?;
+        pool.install(|| asked.par_iter().enumerate().map(one).collect())
+    }
+
+    fn simulate_one(
+        &self,
+        organ: &LoneOrgan,
+        scores: &[f64],
+        bound: &[Skin],
+        progress: &dyn Progress,
+    ) -> Result<Option<Vec<f64>>> {
         let values = self.values(scores);
-        let organ = self.organ.with(|organ| Posterior::apply(&values, organ));
+        let organ = organ.with(|organ| Posterior::apply(&values, organ));
         let pulls: Vec<_> = self.lifts.iter().map(|lift| lift.pull).collect();
         let lifted = organ.lift(&pulls, Pace::QUICK, progress)?;
         progress.advance(self.lifts.len() as u64);
@@ -151,22 +208,29 @@ impl Identification {
             let Some(lifted) = lifted else { return Ok(None) };
             numbers.extend(lift.predicted(&organ, lifted, bound));
         }
-        Ok(Some(Point { scores: scores.to_vec(), numbers }))
+        Ok(Some(numbers))
     }
 
-    /// Draws from the posterior, as far as the simulated points tell it: scores of the parameters
-    /// and of the model's error.
-    fn explore(&self, points: &[Point], likelihood: &Likelihood, random: Random) -> Result<Vec<Vec<f64>>> {
-        let (at, values): (Vec<Vec<f64>>, Vec<Vec<f64>>) =
-            points.iter().map(|p| (p.scores.clone(), p.numbers.clone())).unzip();
-        let emulator =
-            Emulator::through(&at, &values).ok_or_else(|| Error::Lifts("all simulated lifts are alike".to_owned()))?;
+    /// Draws from the distribution of which `log` is the logarithm of what the lifts make of it, as
+    /// far as the simulated points tell: scores of the parameters and of the model's error.
+    fn explore(
+        &self,
+        starts: &[Vec<f64>],
+        surrogate: &Surrogate,
+        rounds: [usize; 3],
+        random: Random,
+        log: &dyn Fn(&Prediction, f64) -> f64,
+    ) -> Vec<Vec<f64>> {
         let log = |scores: &[f64]| {
             let (parameters, error) = scores.split_at(self.priors.len());
             let prior: f64 = -0.5 * scores.iter().map(|s| s * s).sum::<f64>();
-            prior + likelihood.log(&emulator.at(parameters), error[0])
+            prior + log(&surrogate.at(parameters), error[0])
         };
-        // The walkers begin at the best simulated points.
+        walk(starts, rounds, random, log)
+    }
+
+    /// Where walkers begin: at the best simulated points.
+    fn starts(&self, points: &[Point], likelihood: &Likelihood, random: Random) -> Vec<Vec<f64>> {
         let mut ranked: Vec<(f64, &Point)> = points.iter().map(|p| (self.log_at(p, likelihood), p)).collect();
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
         let start = |k: usize| -> Vec<f64> {
@@ -176,16 +240,23 @@ impl Identification {
             let scores = point.scores.iter().enumerate().map(|(d, s)| s + jitter(d));
             scores.chain([0.3 * own.normal(99)]).collect()
         };
-        let starts: Vec<Vec<f64>> = (0..WALKERS).map(start).collect();
-        Ok(walk(&starts, WALK, random, log))
+        (0..WALKERS).map(start).collect()
     }
 
     /// Logarithm of the posterior at a simulated point with the likeliest error of the model.
     fn log_at(&self, point: &Point, likelihood: &Likelihood) -> f64 {
-        let exact = Prediction { mean: point.numbers.clone(), variance: 0.0 };
+        let exact = Prediction { mean: point.numbers().to_vec(), variance: 0.0 };
         let of = |error: f64| -0.5 * error * error + likelihood.log(&exact, error);
         let most = (-8..=20).map(|k| of(0.25 * f64::from(k))).fold(f64::NEG_INFINITY, f64::max);
         most - 0.5 * point.scores.iter().map(|s| s * s).sum::<f64>()
+    }
+
+    /// The likeliest point, of those that were simulated with the finer mesh if there are any.
+    fn best<'a>(&self, points: &'a [Point], likelihood: &Likelihood) -> Result<&'a Point> {
+        let rank = |p: &&Point| (p.finer.is_some(), self.log_at(p, likelihood));
+        let ranked = points.iter().map(|p| (rank(&p), p));
+        let best = ranked.max_by(|((fine, a), _), ((other, b), _)| fine.cmp(other).then(a.total_cmp(b)));
+        best.map(|(_, point)| point).ok_or_else(|| Error::Lifts("no simulated lift is left".to_owned()))
     }
 
     fn conclude(
@@ -205,13 +276,8 @@ impl Identification {
             let open = left_open(&self.priors[k], mean[k]);
             covariance[k][k] += open * open;
         }
-        let best = points
-            .iter()
-            .map(|p| (self.log_at(p, likelihood), p))
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, p)| p)
-            .ok_or_else(|| Error::Lifts("no simulated lift is left".to_owned()))?;
-        let rmse = self.rmse(&best.numbers);
+        let best = self.best(points, likelihood)?;
+        let rmse = self.rmse(best.numbers());
         let mut posterior = Posterior {
             recording: self.recording.clone(),
             lifts: self.lifts.iter().map(|l| l.number).collect(),

@@ -14,13 +14,15 @@ mod likelihood;
 mod lone_organ;
 mod observation;
 mod prior;
+mod pull_error;
 mod quantile;
 mod seen;
+mod surrogate;
 mod walkers;
 
 pub use alignment::Alignment;
 pub use error::{Error, Result};
-pub use identification::{Identification, Identified};
+pub use identification::{FINER, Identification, Identified};
 pub use lone_organ::{Grip, Lifted, LoneOrgan, Pace, Pull};
 pub use observation::{Landmark, Observation};
 pub use prior::default_priors;

@@ -50,6 +50,27 @@ pub fn lowest_along(nodes: &[DVec3], s: &[f64], up: DVec3, [from, to]: [f64; 2],
     (0..count).filter_map(lowest).collect()
 }
 
+/// The length of the part `from` to `to` that each of some places along it bears, if a load on the
+/// part is divided between the two places around it as on a beam. The places rise; outermost ones
+/// bear up to `margin` beyond themselves.
+pub fn borne(places: &[f64], [from, to]: [f64; 2], margin: f64) -> Vec<f64> {
+    let mut borne = vec![0.0; places.len()];
+    let (Some(first), Some(last)) = (places.first(), places.last()) else { return borne };
+    let overlap = |low: f64, high: f64| (low.max(from), high.min(to));
+    let length = |(low, high): (f64, f64)| (high - low).max(0.0);
+    borne[0] += length(overlap(first - margin, *first));
+    borne[places.len() - 1] += length(overlap(*last, last + margin));
+    for (i, pair) in places.windows(2).enumerate() {
+        let part = overlap(pair[0], pair[1]);
+        if length(part) > 0.0 {
+            let share = (0.5 * (part.0 + part.1) - pair[0]) / (pair[1] - pair[0]);
+            borne[i] += (1.0 - share) * length(part);
+            borne[i + 1] += share * length(part);
+        }
+    }
+    borne
+}
+
 fn lowest(candidates: &mut [u32], nodes: &[DVec3], up: DVec3, share: f64) -> Vec<u32> {
     let height = |i: u32| nodes[i as usize].dot(up);
     candidates.sort_by(|a, b| height(*a).total_cmp(&height(*b)).then(a.cmp(b)));
@@ -81,6 +102,17 @@ mod tests {
         let found = lowest_along(&column(), &s, DVec3::Z, [0.5, 1.0], 0.3);
         assert_eq!(found, [(6, 0.25), (9, 0.25)]);
         assert_eq!(lowest_along(&column(), &s, DVec3::Z, [0.92, 0.97], 0.3), []);
+    }
+
+    #[test]
+    fn places_bear_the_part_around_them() {
+        let places = [0.1, 0.3, 0.4];
+        let near = |found: Vec<f64>, right: [f64; 3]| found.iter().zip(right).all(|(a, b)| (a - b).abs() < 1e-12);
+        assert!(near(borne(&places, [0.0, 1.0], 0.05), [0.15, 0.15, 0.1]));
+        // Of 0.2 to 0.3 a quarter is the first one's.
+        assert!(near(borne(&places, [0.2, 0.3], 0.05), [0.025, 0.075, 0.0]));
+        assert!(near(borne(&places, [0.6, 0.9], 0.05), [0.0; 3]));
+        assert!(borne(&[], [0.0, 1.0], 0.1).is_empty());
     }
 
     #[test]

@@ -10,7 +10,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use trocar_core::Progress;
-use trocar_identify::{Grip, Identification, Identified, LoneOrgan, Pace, SeenLift, default_priors};
+use trocar_identify::{FINER, Grip, Identification, Identified, LoneOrgan, Pace, SeenLift, default_priors};
 use trocar_measure::RecordingFilm;
 use trocar_recording::Recording;
 use trocar_specimen::{Organ, Parameter, Posterior, Specimen};
@@ -29,7 +29,7 @@ pub struct Identifying {
     pub organ: Option<String>,
     /// Numbers of the lifts; all if empty.
     pub lifts: Vec<usize>,
-    /// Cells of the mesh in which lifts are simulated (m).
+    /// Cells of the coarse mesh in which lifts are simulated (m); the finer one follows from it.
     pub cell: f64,
     /// Seed of the draws.
     pub seed: u64,
@@ -132,6 +132,7 @@ impl Identifying {
         }
         let identification = Identification {
             organ: organ.meshed(self.cell)?,
+            finer: organ.meshed(FINER * self.cell)?,
             lifts: seen.iter().map(|(number, lift)| lift.observation(*number)).collect(),
             priors: default_priors(),
             seed: self.seed,

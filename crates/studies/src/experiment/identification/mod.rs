@@ -16,7 +16,7 @@ use result::{FitRow, coverage, errors};
 use trocar_core::Progress;
 use trocar_report::document::Document;
 
-/// Cells of the fitted mesh and of the coarser one (mm).
+/// Cells of the coarse mesh of the fit, by default and in a coarser variant (mm).
 const CELL_MM: f64 = 4.0;
 const COARSER_MM: f64 = 4.8;
 
@@ -76,7 +76,7 @@ impl Study for IdentificationExperiment {
             let own = folder.join(format!("{}-{}", t.cell_mm, t.forces));
             Phantom::new(t.seed, &own, progress)?.fit(1e-3 * t.cell_mm, t.forces, progress)
         };
-        let Outcomes { rows, resumed } = job.trials("fits", "1", &trials, key, self.threads, run)?;
+        let Outcomes { rows, resumed } = job.trials("fits", "2", &trials, key, self.threads, run)?;
         let of = |cell_mm: f64, forces: bool| -> Vec<&FitRow> {
             rows.iter().filter(|r| r.cell_mm == cell_mm && r.forces == forces).collect()
         };

@@ -7,7 +7,7 @@ use std::path::Path;
 use trocar_core::{Progress, Random};
 use trocar_geometry::io::{Unit, read_surface};
 use trocar_geometry::{LatticeMesher, MeshDistance};
-use trocar_identify::{Grip, Identification, Landmark, LoneOrgan, Observation, Pace, Pull, default_priors};
+use trocar_identify::{FINER, Grip, Identification, Landmark, LoneOrgan, Observation, Pace, Pull, default_priors};
 use trocar_phantom::RecordOptions;
 use trocar_specimen::{
     End, Material, MaterialModel, NINETY, Organ, OrganFacts, Parameter, Pins, Posterior, Provenance, Specimen,
@@ -85,9 +85,10 @@ impl Phantom {
         Err(Error::Mismatch(format!("phantom {seed}: none of {DRAWS} draws of its tissue can be lifted")))
     }
 
-    /// Fits the even lifts with a mesh of cells of `cell` (m), with the measured forces or without.
+    /// Fits the even lifts with a coarse mesh of cells of `cell` (m) and a finer one, with the measured forces or without.
     pub fn fit(&self, cell: f64, forces: bool, progress: &dyn Progress) -> Result<FitRow> {
-        let organ = self.organ.meshed(cell)?;
+        let [coarse, organ] = [cell, FINER * cell].map(|cell| self.organ.meshed(cell));
+        let (coarse, organ) = (coarse?, organ?);
         let mut lifts = self.lifts.clone();
         if !forces {
             lifts.iter_mut().for_each(|lift| lift.force = None);
@@ -96,7 +97,8 @@ impl Phantom {
         let priors = default_priors();
         let recording = format!("phantom {}", self.seed);
         let identification = Identification {
-            organ: organ.clone(),
+            organ: coarse.clone(),
+            finer: organ.clone(),
             lifts: fitted,
             priors: priors.clone(),
             seed: self.seed,
@@ -129,7 +131,7 @@ impl Phantom {
             phantom: self.seed,
             cell_mm: 1e3 * cell,
             forces,
-            nodes: organ.organ().body.vertices.len(),
+            nodes: coarse.organ().body.vertices.len(),
             parameters,
             diverged: found.diverged,
             fitted_rmse_mm: 1e3 * found.rmse,

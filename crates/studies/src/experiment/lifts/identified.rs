@@ -3,10 +3,10 @@
 use super::result::{FoldRow, JudgedRow};
 use crate::Result;
 use trocar_core::Progress;
-use trocar_identify::{Grip, Identification, Lifted, LoneOrgan, Pace, SeenLift, default_priors};
+use trocar_identify::{FINER, Grip, Identification, Lifted, LoneOrgan, Pace, SeenLift, default_priors};
 use trocar_specimen::{Parameter, Posterior};
 
-/// Cells of the mesh in which lifts are fitted (m).
+/// Cells of the coarse mesh in which lifts are fitted (m).
 const CELL: f64 = 4e-3;
 
 /// Landmark error and local Chamfer distance of a lift (mm).
@@ -23,6 +23,7 @@ pub(crate) fn identified(
     let (fitted, judged): (Vec<_>, Vec<_>) = lifts.iter().partition(|(number, _)| number % 2 == fold);
     let identification = Identification {
         organ: appendix.meshed(CELL)?,
+        finer: appendix.meshed(FINER * CELL)?,
         lifts: fitted.iter().map(|(number, lift)| lift.observation(*number)).collect(),
         priors: default_priors(),
         seed: 1,
