@@ -1,9 +1,9 @@
 //! A Gaussian process through simulated lifts: it stands in for the simulation while the posterior
 //! is explored (M. C. Kennedy, A. O'Hagan, "Bayesian calibration of computer models", 2001).
 //!
-//! All numbers of the lifts share one kernel: a constant, a linear part, and Matern's with 5/2 and a
-//! length for each parameter, because lifts have kinks where threads become taut. The lengths and
-//! the nugget maximise the likelihood.
+//! All numbers of the lifts share one kernel: a constant, a linear part, and Matern's with 5/2 and
+//! a length for each parameter, because lifts have kinks where threads become taut. The lengths
+//! and the nugget maximise the likelihood.
 
 use crate::dense::{Factor, dot};
 
@@ -133,8 +133,8 @@ impl Emulator {
         Prediction { mean, variance }
     }
 
-    /// Those `count` of some candidates that tell most about all: each has the largest variance that
-    /// simulations of those before it would leave.
+    /// Those `count` of some candidates that tell most about all: each has the largest variance
+    /// that simulations of those before it would leave.
     pub fn most_uncertain(&self, candidates: &[Vec<f64>], count: usize) -> Vec<usize> {
         let row = |c: &Vec<f64>| {
             let mut row: Vec<f64> = self.points.iter().map(|p| self.kernel.at(p, c)).collect();

@@ -18,8 +18,8 @@ use trocar_specimen::{Parameter, Posterior, Prior};
 /// Cells of the finer mesh over those of the coarse one.
 pub const FINER: f64 = 0.75;
 
-/// Simulated values a parameter: of the first round, from the prior, with the coarse mesh alone, and
-/// of each further round, of which one in so many has the finer mesh too.
+/// Simulated values a parameter: of the first round, from the prior, with the coarse mesh alone,
+/// and of each further round, of which one in so many has the finer mesh too.
 const FIRST: usize = 14;
 const FURTHER: [(usize, usize); 5] = [(4, 3), (4, 3), (4, 3), (4, 2), (4, 2)];
 

@@ -63,8 +63,8 @@ impl Likelihood {
         made
     }
 
-    /// Takes account of errors of the pulls: how the numbers of all lifts change with a deviation of
-    /// each.
+    /// Takes account of errors of the pulls: how the numbers of all lifts change with a deviation
+    /// of each.
     pub fn with_pull_errors(&mut self, rows: &[Vec<f64>]) {
         let own = |row: &Vec<f64>| {
             let moves = |i: &usize| (0..3).any(|axis| row[self.at[*i] + axis] != 0.0);
@@ -93,8 +93,8 @@ impl Likelihood {
         -0.5 * (distance + determinant)
     }
 
-    /// The squared distance of the measured from predicted lifts in deviations, and the logarithm of
-    /// the determinant of their covariance, if the prediction has this variance.
+    /// The squared distance of the measured from predicted lifts in deviations, and the logarithm
+    /// of the determinant of their covariance, if the prediction has this variance.
     fn parts(&self, predicted: &Prediction, variance: f64, error_score: f64) -> [f64; 2] {
         let error = Self::model_error(error_score);
         let covariance = |i: usize, j: usize| {

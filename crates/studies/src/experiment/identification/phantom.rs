@@ -85,7 +85,8 @@ impl Phantom {
         Err(Error::Mismatch(format!("phantom {seed}: none of {DRAWS} draws of its tissue can be lifted")))
     }
 
-    /// Fits the even lifts with a coarse mesh of cells of `cell` (m) and a finer one, with the measured forces or without.
+    /// Fits the even lifts with a coarse mesh of cells of `cell` (m) and a finer one, with the
+    /// measured forces or without.
     pub fn fit(&self, cell: f64, forces: bool, progress: &dyn Progress) -> Result<FitRow> {
         let [coarse, organ] = [cell, FINER * cell].map(|cell| self.organ.meshed(cell));
         let (coarse, organ) = (coarse?, organ?);
