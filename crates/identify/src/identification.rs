@@ -40,7 +40,7 @@ const LEAST_LANDMARKS: usize = 6;
 pub struct Identification {
     /// The organ alone, in the coarse mesh in which it is simulated most often.
     pub organ: LoneOrgan,
-    /// The same in the mesh that the values are to hold for, with cells [`FINER`] times as long.
+    /// The organ in a finer mesh, with cells [`FINER`] times as long. Identified values are for it.
     pub finer: LoneOrgan,
     /// The lifts.
     pub lifts: Vec<Observation>,
@@ -211,8 +211,8 @@ impl Identification {
         Ok(Some(numbers))
     }
 
-    /// Draws from the distribution of which `log` is the logarithm of what the lifts make of it, as
-    /// far as the simulated points tell: scores of the parameters and of the model's error.
+    /// Draws scores of the parameters and of the model's error from the product of the prior and
+    /// the likelihood whose logarithm is `log`, with the surrogate in place of simulations.
     fn explore(
         &self,
         starts: &[Vec<f64>],

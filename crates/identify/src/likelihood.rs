@@ -85,7 +85,7 @@ impl Likelihood {
         -0.5 * (distance + determinant)
     }
 
-    /// The same as if nothing were known for being uncertain: values stay in question until their
+    /// The same, but an uncertain prediction costs nothing: values stay in question until their
     /// simulation is known well enough to rule them out.
     pub fn in_question(&self, predicted: &Prediction, error_score: f64) -> f64 {
         let [distance, _] = self.parts(predicted, predicted.variance, error_score);

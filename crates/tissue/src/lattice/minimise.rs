@@ -1,7 +1,7 @@
 //! One minimisation: L-BFGS over the lattices of an island, preconditioned by a factor of each
 //! body.
 //!
-//! The factor is that of the stiffness at rest, turned with each hexahedron, with inertia,
+//! The factor is that of the stiffness, at rest or of the strained hexahedron, with inertia,
 //! viscosity, pins, contacts and grasps as they are when it is made. It is made once in a frame,
 //! and only for bodies whose forces are not in balance. Where the search needs many steps, it is
 //! made again from the projected second derivative. Everything is in double precision and in a
@@ -17,7 +17,7 @@ const MEMORY: usize = 12;
 /// Share of the linear decrease that a step must bring (Armijo).
 const ARMIJO: f64 = 1e-4;
 
-/// Greatest number of times that a step is shortened, each time to a tenth at least.
+/// Greatest number of times that a step is shortened.
 const MAX_CUTS: usize = 20;
 
 /// Steps before the factors are made again.

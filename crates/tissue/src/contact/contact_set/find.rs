@@ -13,10 +13,10 @@ use glam::Vec3A;
 const MARK: u32 = 1 << 31;
 
 impl ContactSet {
-    /// Calls `found` for everything within reach of a `vertex` at `x`: what it is; the height above
-    /// it now; normal and point of the plane at the substep's end; the vertex in the frame of what
-    /// it touches; and a factor of its contact stiffness, because a field's penalty is along its
-    /// `up`.
+    /// Calls `found` for each source within reach of a `vertex` at `x`. Its arguments are the
+    /// source, the vertex's height above it now, the normal and a point of its plane at the
+    /// substep's end, the vertex in the frame of the source, and a factor of the contact stiffness,
+    /// which is not 1 for a field, because its penalty is along its `up`.
     #[inline(always)]
     pub(super) fn for_sources(
         &self,
