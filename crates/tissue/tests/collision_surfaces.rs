@@ -151,8 +151,8 @@ fn the_force_does_not_depend_on_how_fine_the_surface_is() {
                 let (force, _, fallbacks) = pressed(&solver, Some(&surface), &shape, contact, depth);
                 let off = force / plain - 1.0;
                 println!("{}, {what}, {contact:?}, {name}: {force:.4} N, {:+.1}%", solver.name, 1e2 * off);
-                // Where a lattice slides under the ball is decided by the last digits of the search,
-                // and friction remembers it.
+                // Where a lattice slides under the ball is decided by the last digits of the
+                // search, and friction remembers it.
                 let wanders = solver.name == "lattice" && what == "ball" && contact == ToolContact::Surface;
                 let most = match name {
                     "same" if wanders => 0.01,
