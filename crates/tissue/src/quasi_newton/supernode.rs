@@ -12,6 +12,7 @@ pub(super) struct Supernode {
     pub width: usize,
     /// Rows below its diagonal, in `Tiles::rows`.
     pub rows: Range<usize>,
-    /// Its first tile: by rows of tiles, those of the diagonal triangle first.
+    /// Its first tile: by columns of tiles, which both halves of a solve read one after another;
+    /// those of the diagonal triangle first.
     pub tiles: usize,
 }

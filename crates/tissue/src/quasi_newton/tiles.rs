@@ -78,16 +78,16 @@ impl Tiles {
         let height = 3 * (self.rows.len() - begin);
         self.supernodes.push(Supernode { first, width, rows: begin..self.rows.len(), tiles: self.tiles.len() });
         let columns = covering(width);
-        for i in 0..columns {
-            for j in 0..=i {
+        for j in 0..columns {
+            for i in j..columns {
                 self.pack(level, |r, c| {
                     let (r, c) = (TILE_SIZE * i + r, TILE_SIZE * j + c);
                     if r < width && c <= r { inverse(r, c) } else { 0.0 }
                 });
             }
         }
-        for i in 0..covering(height) {
-            for j in 0..columns {
+        for j in 0..columns {
+            for i in 0..covering(height) {
                 self.pack(level, |r, c| {
                     let (r, c) = (TILE_SIZE * i + r, TILE_SIZE * j + c);
                     if r < height && c < width { below(r, c) } else { 0.0 }
@@ -191,27 +191,26 @@ impl Tiles {
     #[inline(always)]
     fn forward<S: Simd>(&self, simd: S, s: &Supernode, x: &mut [f32], buffer: &mut [f32]) {
         let columns = covering(s.width);
+        let rows = &self.rows[s.rows.clone()];
+        let tall = covering(3 * rows.len());
         let (y, below) = buffer.split_at_mut(TILE_SIZE * columns);
+        y.fill(0.0);
+        below[..TILE_SIZE * tall].fill(0.0);
         let mut at = s.tiles;
-        for i in 0..columns {
-            let mut sum = f32x16::splat(simd, 0.0);
-            for j in 0..=i {
-                // Beyond the width other supernodes' numbers are read: their tiles are 0 there.
-                let b = &x[s.first + TILE_SIZE * j..s.first + TILE_SIZE * (j + 1)];
-                sum = self.product(simd, at, b, sum);
+        for j in 0..columns {
+            // Beyond the width other supernodes' numbers are read: their tiles are 0 there.
+            let b = &x[s.first + TILE_SIZE * j..s.first + TILE_SIZE * (j + 1)];
+            for sum in y[TILE_SIZE * j..].chunks_exact_mut(TILE_SIZE) {
+                self.product(simd, at, b, f32x16::from_slice(simd, sum)).store_slice(sum);
                 at += 1;
             }
-            sum.store_slice(&mut y[TILE_SIZE * i..TILE_SIZE * (i + 1)]);
         }
         x[s.first..s.first + s.width].copy_from_slice(&y[..s.width]);
-        let rows = &self.rows[s.rows.clone()];
-        for i in 0..covering(3 * rows.len()) {
-            let mut sum = f32x16::splat(simd, 0.0);
-            for j in 0..columns {
-                sum = self.product(simd, at, &y[TILE_SIZE * j..TILE_SIZE * (j + 1)], sum);
+        for y in y.chunks_exact(TILE_SIZE) {
+            for sum in below[..TILE_SIZE * tall].chunks_exact_mut(TILE_SIZE) {
+                self.product(simd, at, y, f32x16::from_slice(simd, sum)).store_slice(sum);
                 at += 1;
             }
-            sum.store_slice(&mut below[TILE_SIZE * i..TILE_SIZE * (i + 1)]);
         }
         for (k, row) in rows.iter().enumerate() {
             let to = &mut x[*row as usize..*row as usize + 3];
@@ -233,28 +232,20 @@ impl Tiles {
             below[3 * k..3 * k + 3].copy_from_slice(&x[*row as usize..*row as usize + 3]);
         }
         below[3 * rows.len()..TILE_SIZE * tall].fill(0.0);
-        let triangle = s.tiles;
-        let panel = triangle + columns * (columns + 1) / 2;
         z[..s.width].copy_from_slice(&x[s.first..s.first + s.width]);
         z[s.width..].fill(0.0);
-        for j in 0..columns {
-            let sum = self.transposed(simd, panel + j, columns, below, tall);
-            let b = f32x16::from_slice(simd, &z[TILE_SIZE * j..TILE_SIZE * (j + 1)]);
-            (b - sum).store_slice(&mut z[TILE_SIZE * j..TILE_SIZE * (j + 1)]);
+        let mut at = s.tiles + columns * (columns + 1) / 2;
+        for z in z.chunks_exact_mut(TILE_SIZE) {
+            let sum = self.transposed(simd, at, &below[..TILE_SIZE * tall]);
+            (f32x16::from_slice(simd, z) - sum).store_slice(z);
+            at += tall;
         }
+        let mut at = s.tiles;
         for j in 0..columns {
-            let mut sums = [f32x16::splat(simd, 0.0); TILE_SIZE];
-            for i in j..columns {
-                self.add_transposed(
-                    simd,
-                    triangle + i * (i + 1) / 2 + j,
-                    &z[TILE_SIZE * i..TILE_SIZE * (i + 1)],
-                    &mut sums,
-                );
-            }
-            let out = transpose_sum(simd, sums);
-            // Only columns j.. are read of z from here on.
+            // Only columns after j are read of z from here on.
+            let out = self.transposed(simd, at, &z[TILE_SIZE * j..]);
             out.store_slice(&mut z[TILE_SIZE * j..TILE_SIZE * (j + 1)]);
+            at += columns - j;
         }
         x[s.first..s.first + s.width].copy_from_slice(&z[..s.width]);
     }
@@ -275,12 +266,12 @@ impl Tiles {
         sum + (even + odd) * self.scales[at]
     }
 
-    /// Sum over a column of `tall` tiles, `stride` apart, of tile' times its part of `below`.
+    /// Sum over a column of tiles, the first of them at `at`, of tile' times its part of `x`.
     #[inline(always)]
-    fn transposed<S: Simd>(&self, simd: S, at: usize, stride: usize, below: &[f32], tall: usize) -> f32x16<S> {
+    fn transposed<S: Simd>(&self, simd: S, at: usize, x: &[f32]) -> f32x16<S> {
         let mut sums = [f32x16::splat(simd, 0.0); TILE_SIZE];
-        for i in 0..tall {
-            self.add_transposed(simd, at + stride * i, &below[TILE_SIZE * i..TILE_SIZE * (i + 1)], &mut sums);
+        for (k, x) in x.chunks_exact(TILE_SIZE).enumerate() {
+            self.add_transposed(simd, at + k, x, &mut sums);
         }
         transpose_sum(simd, sums)
     }
