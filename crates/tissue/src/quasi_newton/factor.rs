@@ -6,6 +6,7 @@ use crate::Body;
 use crate::assembly::{Stiffness, blocks, shape_gradients, tangent};
 use fearless_simd::{Level, Simd};
 use glam::{DMat3, DVec3, Vec3A};
+use std::ops::Range;
 use trocar_sparse::Cholesky;
 
 /// Stiffness that holds a node where a tool carries it, over the node's own.
@@ -130,17 +131,32 @@ impl Factor {
         }
     }
 
-    /// Solves for `x` in place: three numbers a node in the order of elimination. `x` is at least
-    /// 16 numbers longer, finite.
+    /// The first half of a solve in place: three numbers a node in the order of elimination. `x` is
+    /// at least 16 numbers longer, finite.
     #[inline(always)]
-    pub fn solve<S: Simd>(&mut self, simd: S, x: &mut [f32]) {
-        for (x, s) in x.iter_mut().zip(&self.scale) {
-            *x *= s;
-        }
-        self.tiles.solve(simd, x);
-        for (x, s) in x.iter_mut().zip(&self.scale) {
-            *x *= s;
-        }
+    pub fn forward<S: Simd>(&mut self, simd: S, x: &mut [f32]) {
+        self.scale(x);
+        self.tiles.forward(simd, x);
+    }
+
+    /// The second half.
+    #[inline(always)]
+    pub fn backward<S: Simd>(&mut self, simd: S, x: &mut [f32]) {
+        self.tiles.backward(simd, x);
+        self.scale(x);
+    }
+
+    /// The first half for an `x` that has numbers only in the chain of supernodes from that of
+    /// `number` up to the root. Writes the numbers of these supernodes to `ranges`.
+    #[inline(always)]
+    pub fn forward_chain<S: Simd>(&mut self, simd: S, number: usize, x: &mut [f32], ranges: &mut Vec<Range<usize>>) {
+        self.scale(x);
+        self.tiles.forward_chain(simd, number, x, ranges);
+    }
+
+    #[inline(always)]
+    fn scale(&self, x: &mut [f32]) {
+        x.iter_mut().zip(&self.scale).for_each(|(x, s)| *x *= s);
     }
 }
 

@@ -21,6 +21,7 @@ mod body_system;
 mod coarse;
 mod elements;
 mod factor;
+mod half_column;
 mod history;
 mod island_system;
 mod iterate;
@@ -39,6 +40,7 @@ mod system;
 mod tile_parts;
 mod tiles;
 mod tool_stiffness;
+mod tree;
 mod two_loop;
 mod warp;
 

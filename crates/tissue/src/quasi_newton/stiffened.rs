@@ -41,16 +41,11 @@ impl Stiffened {
         self.stiffness * self.gradient.as_flattened().iter().map(|g| g * g).sum::<f32>()
     }
 
-    /// Product of the gradient and a vector of three numbers a node.
+    /// The gradient's numbers, with their places in a vector of three numbers a node.
     #[inline(always)]
-    pub fn product(&self, x: &[f32]) -> f64 {
-        let mut sum = 0.0;
-        for (node, g) in self.nodes.iter().zip(&self.gradient) {
-            for (g, x) in g.iter().zip(&x[3 * *node as usize..]) {
-                sum += f64::from(*g) * f64::from(*x);
-            }
-        }
-        sum
+    pub fn numbers(&self) -> impl Iterator<Item = (usize, f32)> {
+        let nodes = self.nodes.iter().zip(&self.gradient).filter(|(_, g)| **g != [0.0; 3]);
+        nodes.flat_map(|(node, g)| (0..3).map(move |c| (3 * *node as usize + c, g[c])))
     }
 }
 

@@ -14,6 +14,9 @@ use crate::lanes::Row;
 use fearless_simd::{Level, dispatch};
 use glam::{Mat3A, Vec3A};
 
+/// A node that presses harder than in the factor by less than this share is taken as it is there.
+const MIN_HARDER: f32 = 0.5;
+
 /// The preconditioner of one body.
 pub(super) struct System {
     /// None if no node is free.
@@ -52,7 +55,7 @@ impl System {
         }
         let system = Self {
             usable: factor.is_some() || layout.free == 0,
-            update: LowRankUpdate::new(3 * layout.rows),
+            update: LowRankUpdate::new(),
             warp: Warp::new(&layout),
             known: Vec::with_capacity(layout.free),
             held,
@@ -154,12 +157,12 @@ impl System {
                 });
             }
         }
-        // What remains in `pressing` after this is new.
+        // What remains in `pressing` after this is new, or harder than in the factor.
         for (i, stiffness) in known.iter_mut() {
-            *stiffness = -stiffness.abs();
-            if std::mem::take(&mut pressing[*i as usize]) > 0.0 {
-                *stiffness = -*stiffness;
-            }
+            let pressing = &mut pressing[*i as usize];
+            *stiffness = stiffness.abs().copysign(if *pressing > 0.0 { 1.0 } else { -1.0 });
+            let more = *pressing - stiffness.abs();
+            *pressing = if more > MIN_HARDER * stiffness.abs() { more } else { 0.0 };
         }
         let gone = known.iter().filter(|(i, stiffness)| *stiffness < 0.0 && !held[*i as usize]).copied();
         let new = pressing.iter().enumerate().filter(|(_, k)| **k > 0.0).map(|(i, k)| (i as u32, *k));
@@ -178,8 +181,9 @@ impl System {
         let Some(factor) = factor else { return };
         dispatch!(level, simd => {
             warp.to_rest(simd, direction, right);
-            factor.solve(simd, right);
+            factor.forward(simd, right);
             update.apply(simd, right);
+            factor.backward(simd, right);
             warp.out_of_rest(simd, right, direction);
         });
     }
@@ -207,8 +211,9 @@ impl System {
             number.copy_from_slice(&(back * position(row)).to_array());
         }
         dispatch!(level, simd => {
-            factor.solve(simd, right);
+            factor.forward(simd, right);
             update.apply(simd, right);
+            factor.backward(simd, right);
         });
         for (row, number) in x.iter_mut().zip(right.chunks_exact(3)) {
             let turned = *rotation * Vec3A::from_slice(number);

@@ -7,6 +7,7 @@
 //! a tree is cut depends on the factor alone, so the bits do not depend on the threads.
 
 use super::supernode::{Supernode, TILE_SIZE};
+use super::tree::Tree;
 use std::ops::Range;
 
 /// Tiles of the smallest factor that is cut: below, the threads cost more than they save.
@@ -38,24 +39,21 @@ pub(super) struct Part {
 pub(super) struct Parts {
     /// The subtrees; none of a factor that is not cut.
     pub list: Vec<Part>,
-    /// The supernodes above them, in the order of elimination.
+    /// The supernodes above them, in the order of elimination: all of a factor that is not cut.
     pub above: Vec<usize>,
     /// The numbers of these supernodes, ascending.
     pub numbers: Vec<Range<usize>>,
 }
 
 impl Parts {
-    /// Cuts the tree of `supernodes`, whose rows below the diagonal are the numbers `rows`, first
-    /// of three each, and which have `tiles` in all. Numbers of the parts' supernodes then refer to
-    /// the parts' vectors. `buffer` is room for the longest column of row tiles.
-    pub fn cut(supernodes: &mut [Supernode], rows: &mut [u32], tiles: usize, buffer: usize) -> Self {
-        if tiles < MIN_TILES {
-            return Self::default();
-        }
-        let tree = Tree::new(supernodes, rows, tiles);
-        let (roots, above) = tree.cut(tiles as f64);
+    /// Cuts the `tree` of `supernodes`, whose rows below the diagonal are the numbers `rows`, first
+    /// of three each. Numbers of the parts' supernodes then refer to the parts' vectors. `buffer`
+    /// is room for the longest column of row tiles.
+    pub fn cut(tree: &Tree, supernodes: &mut [Supernode], rows: &mut [u32], buffer: usize) -> Self {
+        let tiles: usize = tree.own.iter().sum();
+        let (roots, above) = if tiles < MIN_TILES { Default::default() } else { roots_of_parts(tree, tiles as f64) };
         if roots.len() < 2 {
-            return Self::default();
+            return Self { above: (0..supernodes.len()).collect(), ..Self::default() };
         }
         let numbers: Vec<Range<usize>> =
             above.iter().map(|s| supernodes[*s].first..supernodes[*s].first + supernodes[*s].width).collect();
@@ -104,8 +102,9 @@ impl Part {
         }
     }
 
-    /// Begins the backward half: reads the numbers above, `ranges` of `x`.
+    /// Begins the backward half: reads the part's numbers and those above, `ranges` of `x`.
     pub fn read(&mut self, ranges: &[Range<usize>], x: &[f32]) {
+        self.vector[..self.numbers.len()].copy_from_slice(&x[self.numbers.clone()]);
         let mut at = self.above;
         for range in ranges {
             self.vector[at..at + range.len()].copy_from_slice(&x[range.clone()]);
@@ -113,62 +112,30 @@ impl Part {
         }
     }
 
-    /// Ends the backward half: writes the part's numbers into `x`.
+    /// Ends either half: writes the part's numbers into `x`.
     pub fn end(&self, x: &mut [f32]) {
         x[self.numbers.clone()].copy_from_slice(&self.vector[..self.numbers.len()]);
     }
 }
 
-/// The tree of supernodes.
-struct Tree {
-    children: Vec<Vec<usize>>,
-    roots: Vec<usize>,
-    /// The first supernode of each subtree: the subtree is all from it on.
-    first: Vec<usize>,
-    /// Tiles of each supernode, and of its subtree.
-    own: Vec<usize>,
-    all: Vec<usize>,
-}
-
-impl Tree {
-    fn new(supernodes: &[Supernode], rows: &[u32], tiles: usize) -> Self {
-        let count = supernodes.len();
-        let ends = supernodes.iter().skip(1).map(|s| s.tiles).chain([tiles]);
-        let own: Vec<usize> = supernodes.iter().zip(ends).map(|(s, end)| end - s.tiles).collect();
-        let (mut children, mut roots) = (vec![Vec::new(); count], Vec::new());
-        let (mut first, mut all) = ((0..count).collect::<Vec<usize>>(), own.clone());
-        for (k, s) in supernodes.iter().enumerate() {
-            let Some(row) = rows[s.rows.clone()].first() else {
-                roots.push(k);
-                continue;
-            };
-            let parent = supernodes.partition_point(|s| s.first + s.width <= *row as usize);
-            children[parent].push(k);
-            first[parent] = first[parent].min(first[k]);
-            all[parent] += all[k];
+/// The roots of the parts, and the supernodes above them, both in the order of elimination.
+fn roots_of_parts(tree: &Tree, tiles: f64) -> (Vec<usize>, Vec<usize>) {
+    let (mut parts, mut above, mut above_tiles) = (tree.roots.clone(), Vec::new(), 0);
+    while parts.len() < MAX_PARTS {
+        let Some(largest) = (0..parts.len()).max_by_key(|k| (tree.all[parts[*k]], *k)) else { break };
+        let root = parts[largest];
+        let more = above_tiles + tree.own[root];
+        let small = (tree.all[root] as f64) < MIN_SHARE * tiles;
+        if small || tree.children[root].is_empty() || more as f64 > MAX_SHARE_ABOVE * tiles {
+            break;
         }
-        Self { children, roots, first, own, all }
+        above_tiles = more;
+        above.push(root);
+        parts.splice(largest..=largest, tree.children[root].iter().copied());
     }
-
-    /// The roots of the parts, and the supernodes above them, both in the order of elimination.
-    fn cut(&self, tiles: f64) -> (Vec<usize>, Vec<usize>) {
-        let (mut parts, mut above, mut above_tiles) = (self.roots.clone(), Vec::new(), 0);
-        while parts.len() < MAX_PARTS {
-            let Some(largest) = (0..parts.len()).max_by_key(|k| (self.all[parts[*k]], *k)) else { break };
-            let root = parts[largest];
-            let more = above_tiles + self.own[root];
-            let small = (self.all[root] as f64) < MIN_SHARE * tiles;
-            if small || self.children[root].is_empty() || more as f64 > MAX_SHARE_ABOVE * tiles {
-                break;
-            }
-            above_tiles = more;
-            above.push(root);
-            parts.splice(largest..=largest, self.children[root].iter().copied());
-        }
-        parts.sort_unstable();
-        above.sort_unstable();
-        (parts, above)
-    }
+    parts.sort_unstable();
+    above.sort_unstable();
+    (parts, above)
 }
 
 #[cfg(test)]
@@ -218,19 +185,26 @@ mod tests {
             let rows = panel.rows().iter().copied();
             tiles.push(level, panel.first(), width, rows, |r, c| inverse[width * c + r], |r, c| panel.below(r, c));
         }
+        tiles.end();
+        assert!(tiles.parts() >= 2, "the factor is too small to be cut");
         let right: Vec<f32> = (0..3 * positions.len()).map(|i| ((7 * i) % 11) as f32 - 5.0).collect();
         let solve = |tiles: &mut Tiles| {
             let mut x = right.clone();
             x.resize(right.len() + 16, 0.0);
-            dispatch!(level, simd => tiles.solve(simd, &mut x));
+            dispatch!(level, simd => {
+                tiles.forward(simd, &mut x);
+                tiles.backward(simd, &mut x);
+            });
             x
         };
-        let whole = solve(&mut tiles);
-        tiles.end();
-        assert!(tiles.parts() >= 2, "the factor is too small to be cut");
         let parts = solve(&mut tiles);
+        // The factor before it was packed has the nodes as the matrix numbers them.
+        let numbers = |k: usize| 3 * factor.order()[k / 3] as usize + k % 3;
+        let mut whole = vec![0.0; right.len()];
+        right.iter().enumerate().for_each(|(k, x)| whole[numbers(k)] = *x);
+        factor.solve(level, &mut whole);
         let most = whole.iter().fold(0.0f32, |most, x| most.max(x.abs()));
-        assert!(whole.iter().zip(&parts).all(|(a, b)| (a - b).abs() < 1e-4 * most));
+        assert!(parts.iter().take(whole.len()).enumerate().all(|(k, x)| (x - whole[numbers(k)]).abs() < 1e-3 * most));
         for threads in [1, 2, 3] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             assert!(pool.install(|| solve(&mut tiles)) == parts, "{threads} threads");

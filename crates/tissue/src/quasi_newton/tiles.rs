@@ -10,8 +10,10 @@
 
 use super::supernode::{Supernode, TILE_SIZE};
 use super::tile_parts::{Part, Parts};
+use super::tree::Tree;
 use crate::threads::for_each;
 use fearless_simd::{Level, Simd, SimdBase, SimdCvtFloat, dispatch, f32x16, i32x16};
+use std::ops::Range;
 
 /// Greatest number in 16 bits.
 const MAX_INT16: f32 = 32767.0;
@@ -30,6 +32,8 @@ pub(super) struct Tiles {
     supernodes: Vec<Supernode>,
     /// The first of the three numbers of each node below the supernodes' diagonals.
     rows: Vec<u32>,
+    /// The tree of supernodes.
+    tree: Tree,
     parts: Parts,
     tiles: Vec<Tile>,
     scales: Vec<f32>,
@@ -47,6 +51,7 @@ impl Tiles {
         Self {
             supernodes: Vec::new(),
             rows: Vec::new(),
+            tree: Tree::default(),
             parts: Parts::default(),
             tiles: Vec::new(),
             scales: Vec::new(),
@@ -99,7 +104,8 @@ impl Tiles {
 
     /// Ends the factor after its last supernode.
     pub fn end(&mut self) {
-        self.parts = Parts::cut(&mut self.supernodes, &mut self.rows, self.tiles.len(), self.buffer.len());
+        self.tree = Tree::new(&self.supernodes, &self.rows, self.tiles.len());
+        self.parts = Parts::cut(&self.tree, &mut self.supernodes, &mut self.rows, self.buffer.len());
     }
 
     /// Parts that threads solve with at once; 0 if the factor is not cut.
@@ -134,62 +140,80 @@ impl Tiles {
         self.scales.push(scale / 65536.0);
     }
 
-    /// Solves in place: `x` is the right side and then the solution, three numbers a node in the
-    /// order of elimination, padded by at least 16.
+    /// Solves L y = x in place: `x` is three numbers a node in the order of elimination, padded by
+    /// at least 16.
     #[inline(always)]
-    pub fn solve<S: Simd>(&mut self, simd: S, x: &mut [f32]) {
+    pub fn forward<S: Simd>(&mut self, simd: S, x: &mut [f32]) {
         let (mut buffer, mut parts) = (std::mem::take(&mut self.buffer), std::mem::take(&mut self.parts));
-        if parts.list.is_empty() {
-            for supernode in &self.supernodes {
-                self.forward(simd, supernode, x, &mut buffer);
-            }
-            for supernode in self.supernodes.iter().rev() {
-                self.backward(simd, supernode, x, &mut buffer);
-            }
-        } else {
-            self.solve_parts(simd, &mut parts, x, &mut buffer);
-        }
-        (self.buffer, self.parts) = (buffer, parts);
-    }
-
-    /// The same by parts.
-    #[inline(always)]
-    fn solve_parts<S: Simd>(&self, simd: S, parts: &mut Parts, x: &mut [f32], buffer: &mut [f32]) {
-        let (Parts { list, above, numbers }, level) = (parts, simd.level());
-        let whole = &*x;
-        for_each(list, |part| {
+        let (whole, level) = (&*x, simd.level());
+        for_each(&mut parts.list, |part| {
             part.begin(whole);
             let Part { supernodes, vector, buffer, .. } = part;
             // Another thread has to ask for its instruction set itself.
             dispatch!(level, simd => for s in &self.supernodes[supernodes.clone()] {
-                self.forward(simd, s, vector, buffer);
+                self.eliminate(simd, s, vector, buffer);
             });
         });
-        for part in &*list {
-            part.take_from(numbers, x);
-        }
-        for s in &*above {
-            self.forward(simd, &self.supernodes[*s], x, buffer);
-        }
-        for s in above.iter().rev() {
-            self.backward(simd, &self.supernodes[*s], x, buffer);
-        }
-        let whole = &*x;
-        for_each(list, |part| {
-            part.read(numbers, whole);
-            let Part { supernodes, vector, buffer, .. } = part;
-            dispatch!(level, simd => for s in self.supernodes[supernodes.clone()].iter().rev() {
-                self.backward(simd, s, vector, buffer);
-            });
-        });
-        for part in &*list {
+        for part in &parts.list {
+            part.take_from(&parts.numbers, x);
             part.end(x);
         }
+        for s in &parts.above {
+            self.eliminate(simd, &self.supernodes[*s], x, &mut buffer);
+        }
+        (self.buffer, self.parts) = (buffer, parts);
+    }
+
+    /// Solves L' x = y in place.
+    #[inline(always)]
+    pub fn backward<S: Simd>(&mut self, simd: S, x: &mut [f32]) {
+        let (mut buffer, mut parts) = (std::mem::take(&mut self.buffer), std::mem::take(&mut self.parts));
+        for s in parts.above.iter().rev() {
+            self.substitute(simd, &self.supernodes[*s], x, &mut buffer);
+        }
+        let (whole, level) = (&*x, simd.level());
+        for_each(&mut parts.list, |part| {
+            part.read(&parts.numbers, whole);
+            let Part { supernodes, vector, buffer, .. } = part;
+            dispatch!(level, simd => for s in self.supernodes[supernodes.clone()].iter().rev() {
+                self.substitute(simd, s, vector, buffer);
+            });
+        });
+        for part in &parts.list {
+            part.end(x);
+        }
+        (self.buffer, self.parts) = (buffer, parts);
+    }
+
+    /// Solves L y = x in place for an `x` that has numbers only in the chain of supernodes from
+    /// that of `number` up to the root, and is 0 elsewhere. Writes the numbers of these supernodes
+    /// to `ranges`.
+    #[inline(always)]
+    pub fn forward_chain<S: Simd>(&mut self, simd: S, number: usize, x: &mut [f32], ranges: &mut Vec<Range<usize>>) {
+        let (mut buffer, mut parts) = (std::mem::take(&mut self.buffer), std::mem::take(&mut self.parts));
+        ranges.clear();
+        let mut next = Some(self.tree.supernode_of(number));
+        if let Some(part) = parts.list.iter_mut().find(|part| part.numbers.contains(&number)) {
+            part.begin(x);
+            while let Some(s) = next.filter(|s| part.supernodes.contains(s)) {
+                self.eliminate(simd, &self.supernodes[s], &mut part.vector, &mut part.buffer);
+                ranges.push(self.tree.numbers(s));
+                next = self.tree.parent(s);
+            }
+            part.take_from(&parts.numbers, x);
+            part.end(x);
+        }
+        while let Some(s) = next {
+            self.eliminate(simd, &self.supernodes[s], x, &mut buffer);
+            ranges.push(self.tree.numbers(s));
+            next = self.tree.parent(s);
+        }
+        (self.buffer, self.parts) = (buffer, parts);
     }
 
     /// y = inverse b, and the rows below lose their product with y.
     #[inline(always)]
-    fn forward<S: Simd>(&self, simd: S, s: &Supernode, x: &mut [f32], buffer: &mut [f32]) {
+    fn eliminate<S: Simd>(&self, simd: S, s: &Supernode, x: &mut [f32], buffer: &mut [f32]) {
         let columns = covering(s.width);
         let rows = &self.rows[s.rows.clone()];
         let tall = covering(3 * rows.len());
@@ -223,7 +247,7 @@ impl Tiles {
 
     /// x = inverse' (y - below' x_below).
     #[inline(always)]
-    fn backward<S: Simd>(&self, simd: S, s: &Supernode, x: &mut [f32], buffer: &mut [f32]) {
+    fn substitute<S: Simd>(&self, simd: S, s: &Supernode, x: &mut [f32], buffer: &mut [f32]) {
         let columns = covering(s.width);
         let rows = &self.rows[s.rows.clone()];
         let tall = covering(3 * rows.len());
