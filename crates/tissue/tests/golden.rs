@@ -64,7 +64,7 @@ fn rigid_grasp_and_supports() {
     state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY));
     let tools = |k: usize| vec![at(DVec3::new(1e-3, 0.0, 5e-3) * bump(k, 60))];
     let found = hashes(&model, &state, 60, &tools, &[]);
-    check("rigid grasp and supports", found, [0xb08631d0e9a8acc5, 0xba4f0004a89c016c, 0xe3742422f98ac601]);
+    check("rigid grasp and supports", found, [0x5c36397d311d497e, 0x4ef911657db81c68, 0x076af93f8376e204]);
 }
 
 /// A block on a pinned one, a third that flies into them, jaws that lift one compliantly, a probe.
@@ -126,7 +126,7 @@ fn lift_and_probe(frame: usize) -> Vec<Pose> {
 fn bodies_and_tools_that_touch() {
     let (model, state) = touching_bodies();
     let found = hashes(&model, &state, 40, &lift_and_probe, &[]);
-    check("bodies and tools that touch", found, [0x4c4bb30ea75aa11d, 0xc18d125f22a6087f, 0xdcff47f959a781f0]);
+    check("bodies and tools that touch", found, [0xcfbe055dd7343ed1, 0x6fa9e7edf5d97b7b, 0x5fca30d71c5d9519]);
 }
 
 /// Loads, a state with inverted elements, and one that is stretched.
@@ -145,7 +145,7 @@ fn loads_and_disturbed_states() {
     let loads = [(0, 40, DVec3::new(0.01, 0.0, 0.02)), (2, 5, DVec3::new(0.0, 1e-3, 1e-3))];
     let loads = loads.map(|(body, node, force)| Load { body, node, force });
     let found = hashes(&model, &state, 20, &lift_and_probe, &loads);
-    check("loads and disturbed states", found, [0x2d7f9c5a8f18dcce, 0x56f090149b7838c4, 0x79ad099b044b933c]);
+    check("loads and disturbed states", found, [0xd2ad19937ad6b180, 0x0ceb4d397d7433e8, 0x5187257365210969]);
 }
 
 /// A block that a rigid grasp crushes.
@@ -159,7 +159,7 @@ fn crushed_block() {
     state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY));
     let tools = |k: usize| vec![at(DVec3::new(3e-3, 0.0, -5.5e-3) * bump(k, 30))];
     let found = hashes(&model, &state, 30, &tools, &[]);
-    check("crushed block", found, [0xc77ac3a65e614889, 0xaa5ba28d0a7f7b46, 0xd4a0413ba037c401]);
+    check("crushed block", found, [0xfe58df8313add6cd, 0xaa5ba28d0a7f7b46, 0xd4a0413ba037c401]);
 }
 
 /// A block on a plane, crushed and hit by a ball.
@@ -186,7 +186,7 @@ fn struck_block() {
         vec![at(DVec3::new(2e-3, 0.0, -11e-3) * t), at(DVec3::new(8e-3, 0.0, -3e-3) * t)]
     };
     let found = hashes(&model, &state, 24, &tools, &[]);
-    check("struck block", found, [0x74decbad8bbe370e, 0xfada90db0ea25b12, 0xd5b6c714c36fa0eb]);
+    check("struck block", found, [0x20aabae17748c7cc, 0x1386c8e84b9284ca, 0xa13be86170b52075]);
 }
 
 /// Elements pressed almost flat, thrown inwards and hit: it overstretches.
@@ -208,7 +208,7 @@ fn flat_elements() {
     }
     let tools = |k: usize| vec![at(DVec3::new(0.0, 0.0, -9e-3) * bump(k, 6))];
     let found = hashes(&model, &state, 12, &tools, &[]);
-    check("flat elements", found, [0xbd5759e7cf847329, 0x2cb97c27f08a2397, 0xf5a74bf1cbfeb030]);
+    check("flat elements", found, [0xf4583c112938fc6d, 0x2cb97c27f08a2397, 0xf5a74bf1cbfeb030]);
 }
 
 /// A spring of negative stiffness: the matrix has no Cholesky factor, and sweeps take over in the
@@ -220,5 +220,5 @@ fn fallback_to_sweeps() {
         jaws.stiffness = -30.0;
     }
     let found = hashes(&model, &state, 12, &lift_and_probe, &[]);
-    check("fallback to sweeps", found, [0x7c924e0e7fbf450a, 0x77f5de6435d096d2, 0x3eb74a9b769ce2e1]);
+    check("fallback to sweeps", found, [0x0a136ab06f45093d, 0x77f5de6435d096d2, 0x8cb879fec5adf793]);
 }

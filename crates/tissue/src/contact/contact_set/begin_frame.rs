@@ -12,8 +12,8 @@ use glam::Vec3A;
 const REACH_MARGIN: f32 = 1e-3;
 
 /// The matrix stays the same if at most so many vertices more or fewer touch, and an eighth of
-/// them.
-const MAX_CHANGED_CONTACTS: usize = 8;
+/// them: as many as two jaws touch. The low-rank update has room for twice as many.
+const MAX_CHANGED_CONTACTS: usize = 24;
 
 impl ContactSet {
     /// Begins a frame: finds what may be touched in it.
@@ -111,7 +111,7 @@ impl ContactSet {
         } else {
             self.surface.iter().for_each(|i| count(*i as usize));
         }
-        if changed > MAX_CHANGED_CONTACTS.min(touching / 2) + touching / 8 {
+        if changed > MAX_CHANGED_CONTACTS + touching / 8 {
             state.warm.supported.copy_from_slice(&self.touching[..self.nodes]);
         }
     }
