@@ -130,7 +130,7 @@ fn stiffness_of_a_contact_is_the_derivative_of_its_force() {
         for (name, fine) in [("ball", false), ("ball on a fine surface", true)] {
             let pressed = compare(name, &layer(young_modulus, fine), None, [AWAY, ball], 3);
             // The ball is 1.5 mm deep in a layer of 10 mm; the stiffness is that of tissue at rest.
-            assert!(pressed < 0.2, "{pressed}");
+            assert!(pressed < 0.15, "{pressed}");
         }
     }
 }

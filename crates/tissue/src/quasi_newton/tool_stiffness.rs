@@ -149,18 +149,16 @@ impl QuasiNewtonSolver {
                 continue;
             }
             let x = position(&self.iterate.x[node]);
-            let sum = |moves: bool| -> Mat3A {
-                let those = touched.iter().filter(|(.., contact)| group.moves(contact.source) == moves);
-                let part = |(_, share, contact): &(u32, f32, &Contact)| {
-                    Some(tangent(contact, contact.site.at(|vertex| self.at(vertex)))? * *share)
-                };
-                those.filter_map(part).fold(Mat3A::ZERO, |sum, k| sum + k)
-            };
-            let (moving, still) = (sum(true), sum(false));
+            let (mut moving, mut still, mut largest) = (Mat3A::ZERO, Mat3A::ZERO, 0.0);
+            for (_, share, contact) in touched {
+                let Some(push) = tangent(contact, contact.site.at(|vertex| self.at(vertex))) else { continue };
+                let sum = if group.moves(contact.source) { &mut moving } else { &mut still };
+                *sum += push.block(contact.normal) * *share;
+                largest += share * push.along.max(push.across);
+            }
             let all = Mat3A::from_diagonal(Vec3::splat(most));
             // What is not in the matrix cannot count.
-            let trace = |m: &Mat3A| m.x_axis.x + m.y_axis.y + m.z_axis.z;
-            let share = (most / (trace(&moving) + trace(&still))).min(1.0);
+            let share = if largest > most { most / largest } else { 1.0 };
             let (stiffness, still) = match held && moving != Mat3A::ZERO {
                 true => (all, Mat3A::ZERO),
                 false => (share * moving, share * still),
@@ -204,12 +202,11 @@ impl QuasiNewtonSolver {
     }
 }
 
-/// Derivative of a contact's force at `x` (N/m) with respect to the motion of what it touches. A
+/// A contact's force at `x`, with its stiffness with respect to the motion of what it touches. A
 /// contact that slips has none along the surface. None where no force acts.
-fn tangent(contact: &Contact, x: Vec3A) -> Option<Mat3A> {
+fn tangent(contact: &Contact, x: Vec3A) -> Option<Push> {
     let push = contact.push(x)?;
-    let across = if contact.slide(x).is_some() { 0.0 } else { push.across };
-    Some(Push { across, ..push }.block(contact.normal))
+    Some(Push { across: if contact.slide(x).is_some() { 0.0 } else { push.across }, ..push })
 }
 
 fn row(v: Vec3A) -> Row {
