@@ -122,14 +122,7 @@ impl Element<'_> {
         let volume = self.hex.fraction * self.cell.powi(3) / 8.0;
         for corner in CORNERS {
             let gradients = self.gradients(self.hex.centre + self.hex.spread * corner);
-            let f = deformation(x, &gradients);
-            let mut to = blocks.iter_mut();
-            for a in 0..8 {
-                for b in 0..=a {
-                    let Some(to) = to.next() else { return };
-                    *to += flow.block(f, gradients[a], gradients[b]) * volume;
-                }
-            }
+            flow.add_blocks(deformation(x, &gradients), &gradients, volume, blocks);
         }
     }
 

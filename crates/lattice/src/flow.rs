@@ -1,5 +1,6 @@
 //! Viscosity over a step: what the strain since its beginning costs.
 
+use crate::element::Blocks;
 use crate::points::{Lanes, Matrix, Symmetric, squared};
 use fearless_simd::{Simd, SimdBase};
 use glam::{DMat3, DVec3};
@@ -47,11 +48,18 @@ impl Flow {
         (squares + trace * trace * 0.5) * self.stiffness
     }
 
-    /// Second derivative by two nodes with shape gradients `a` and `b`, without the part that turns
-    /// the stress: positive semidefinite.
-    pub(crate) fn block(&self, f: DMat3, a: DVec3, b: DVec3) -> DMat3 {
-        let (fa, fb) = (f * a, f * b);
+    /// Second derivatives by each two nodes with these shape gradients where the tissue is at `f`,
+    /// without the part that turns the stress: positive semidefinite. Adds those of the lower
+    /// triangle, row by row, times a `volume`.
+    pub(crate) fn add_blocks(&self, f: DMat3, gradients: &[DVec3; 8], volume: f64, blocks: &mut Blocks) {
+        let (squared, turned) = (f * f.transpose(), gradients.map(|gradient| f * gradient));
         let outer = |p: DVec3, q: DVec3| DMat3::from_cols(p * q.x, p * q.y, p * q.z);
-        (f * f.transpose() * a.dot(b) + outer(fb, fa) + outer(fa, fb)) * self.stiffness
+        for a in 0..8 {
+            for b in 0..=a {
+                let (fa, fb) = (turned[a], turned[b]);
+                let block = squared * gradients[a].dot(gradients[b]) + outer(fb, fa) + outer(fa, fb);
+                blocks[a * (a + 1) / 2 + b] += block * self.stiffness * volume;
+            }
+        }
     }
 }
