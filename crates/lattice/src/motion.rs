@@ -46,3 +46,25 @@ impl Motion {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_have_the_bits_of_their_sums() {
+        let at = |seed: f64, k: usize| (seed + k as f64).sin();
+        let field = |seed: f64| (0..9).map(|k| DVec3::new(at(seed, k), at(seed, 2 * k), at(seed, 3 * k))).collect();
+        let state = BodyState { positions: field(0.1), velocities: field(0.7) };
+        let weights = std::array::from_fn(|k| at(0.3, k));
+        let point = EmbeddedPoint { hexahedron: 0, nodes: [8, 1, 5, 3, 0, 2, 7, 4], weights };
+        let before = Vec3A::new(1.0, 2.0, 3.0);
+        let (mut x, mut v) = ([before; 2], [before; 2]);
+        let mut motion = Motion::default();
+        motion.load(&state);
+        motion.write(&[None, Some(point)], &mut x, &mut v);
+        assert_eq!([x[0], v[0]], [before; 2]);
+        assert_eq!(x[1], point.interpolate(&state.positions).as_vec3a());
+        assert_eq!(v[1], point.interpolate(&state.velocities).as_vec3a());
+    }
+}

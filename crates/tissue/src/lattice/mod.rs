@@ -10,6 +10,8 @@ mod minimise;
 mod start;
 mod system;
 mod terms;
+#[cfg(test)]
+mod tests;
 
 use crate::body_slot::{BodySlot, IslandFrame, Solver};
 use crate::contact::ContactSet;
@@ -193,14 +195,7 @@ fn lattice<'a>(slot: &'a mut BodySlot<LatticeSolver>, member: usize, body: &'a B
 
 /// Appends the springs of rigidly held vertices of a body, whose tools are where they are when
 /// `share` of the frame is over.
-fn hold<'a>(
-    held: &[Held],
-    member: usize,
-    body: &'a Body,
-    frame: &Frame<'_>,
-    share: f64,
-    terms: &mut Vec<Term<'a>>,
-) {
+fn hold<'a>(held: &[Held], member: usize, body: &'a Body, frame: &Frame<'_>, share: f64, terms: &mut Vec<Term<'a>>) {
     let Some(embedding) = body.lattice.as_deref() else { return };
     let stiffness = HOLD_STIFFNESS * body.material.young_modulus * embedding.settings.cell;
     for held in held {

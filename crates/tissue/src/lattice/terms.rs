@@ -198,12 +198,7 @@ fn share<'a>(member: usize, (body, x): Member<'a, '_>, vertex: u32, share: f64) 
 pub(super) type Member<'a, 'x> = (&'a Body, &'x [Vec3A]);
 
 /// Appends the contacts of a body with tools, supports and grasps.
-pub(super) fn push_contacts<'a>(
-    member: usize,
-    body: Member<'a, '_>,
-    contacts: &[Contact],
-    terms: &mut Vec<Term<'a>>,
-) {
+pub(super) fn push_contacts<'a>(member: usize, body: Member<'a, '_>, contacts: &[Contact], terms: &mut Vec<Term<'a>>) {
     for contact in contacts {
         let mut shares = [None; 4];
         for (to, (vertex, weight)) in shares.iter_mut().zip(contact.site.shares()) {
@@ -214,11 +209,7 @@ pub(super) fn push_contacts<'a>(
 }
 
 /// Appends the contacts between the bodies of an island.
-pub(super) fn push_pairs<'a, 'x>(
-    members: impl Fn(usize) -> Member<'a, 'x>,
-    pairs: &Pairs,
-    terms: &mut Vec<Term<'a>>,
-) {
+pub(super) fn push_pairs<'a, 'x>(members: impl Fn(usize) -> Member<'a, 'x>, pairs: &Pairs, terms: &mut Vec<Term<'a>>) {
     for pair in pairs.list() {
         let shares = pair.shares().map(|(member, vertex, weight)| {
             (weight != 0.0).then(|| share(member, members(member), vertex, f64::from(weight)))
