@@ -5,9 +5,9 @@
 //! [`LatticeOptions::fill`](crate::LatticeOptions), on the Gauss points of the whole cell.
 
 use crate::Hexahedron;
-use crate::flow::Flow;
+use crate::flow::{Flow, NodeBlocks};
 use crate::material::{Material, Part, Principal};
-use fearless_simd::{Level, dispatch};
+use fearless_simd::{Level, Simd, dispatch};
 use glam::{DMat3, DVec3};
 use trocar_geometry::symmetric::{Svd, nearest_rotation};
 
@@ -119,16 +119,32 @@ impl Element<'_> {
 
     /// Adds the stiffness of viscosity.
     pub fn add_viscous(&self, x: &[DVec3; 8], flow: &Flow, blocks: &mut Blocks) {
+        dispatch!(Level::new(), simd => self.add_viscous_in(simd, x, flow, blocks));
+    }
+
+    #[inline(always)]
+    fn add_viscous_in<S: Simd>(&self, simd: S, x: &[DVec3; 8], flow: &Flow, blocks: &mut Blocks) {
+        let mut all: NodeBlocks = [[[0.0; 8]; 9]; 8];
+        for a in 0..8 {
+            for b in 0..=a {
+                let block = blocks[a * (a + 1) / 2 + b].to_cols_array();
+                for k in 0..9 {
+                    all[a][k][b] = block[k];
+                }
+            }
+        }
         let volume = self.hex.fraction * self.cell.powi(3) / 8.0;
         for corner in CORNERS {
             let gradients = self.gradients(self.hex.centre + self.hex.spread * corner);
-            let f = deformation(x, &gradients);
-            let mut to = blocks.iter_mut();
-            for a in 0..8 {
-                for b in 0..=a {
-                    let Some(to) = to.next() else { return };
-                    *to += flow.block(f, gradients[a], gradients[b]) * volume;
+            flow.add_blocks(simd, deformation(x, &gradients), &gradients, volume, &mut all);
+        }
+        for a in 0..8 {
+            for b in 0..=a {
+                let mut block = [0.0; 9];
+                for k in 0..9 {
+                    block[k] = all[a][k][b];
                 }
+                blocks[a * (a + 1) / 2 + b] = DMat3::from_cols_array(&block);
             }
         }
     }

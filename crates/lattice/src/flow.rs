@@ -1,6 +1,6 @@
 //! Viscosity over a step: what the strain since its beginning costs.
 
-use crate::points::{Lanes, Matrix, Symmetric, squared};
+use crate::points::{Lanes, Matrix, PointValues, Symmetric, squared};
 use fearless_simd::{Simd, SimdBase};
 use glam::{DMat3, DVec3};
 
@@ -47,11 +47,47 @@ impl Flow {
         (squares + trace * trace * 0.5) * self.stiffness
     }
 
-    /// Second derivative by two nodes with shape gradients `a` and `b`, without the part that turns
-    /// the stress: positive semidefinite.
-    pub(crate) fn block(&self, f: DMat3, a: DVec3, b: DVec3) -> DMat3 {
-        let (fa, fb) = (f * a, f * b);
-        let outer = |p: DVec3, q: DVec3| DMat3::from_cols(p * q.x, p * q.y, p * q.z);
-        (f * f.transpose() * a.dot(b) + outer(fb, fa) + outer(fa, fb)) * self.stiffness
+    /// Second derivatives by each two nodes with these shape gradients where the tissue is at `f`,
+    /// without the part that turns the stress: positive semidefinite. Adds them, times a `volume`.
+    #[inline(always)]
+    pub(crate) fn add_blocks<S: Simd>(
+        &self,
+        simd: S,
+        f: DMat3,
+        gradients: &[DVec3; 8],
+        volume: f64,
+        blocks: &mut NodeBlocks,
+    ) {
+        let (squared, turned) = (f * f.transpose(), gradients.map(|gradient| f * gradient));
+        let (squared, all, all_turned) = (squared.to_cols_array(), lanes(simd, gradients), lanes(simd, &turned));
+        for a in 0..8 {
+            let (own, by) = (gradients[a].to_array(), turned[a].to_array());
+            let along = all[0] * own[0] + all[1] * own[1] + all[2] * own[2];
+            for column in 0..3 {
+                for row in 0..3 {
+                    let k = 3 * column + row;
+                    let block = along * squared[k] + all_turned[row] * by[column] + all_turned[column] * by[row];
+                    let sum = Lanes::<S>::from_slice(simd, &blocks[a][k]) + block * self.stiffness * volume;
+                    sum.store_slice(&mut blocks[a][k]);
+                }
+            }
+        }
     }
+}
+
+/// A block of each node with each node: column by column, the other nodes in the lanes.
+pub(crate) type NodeBlocks = [[PointValues; 9]; 8];
+
+/// The coordinates of eight vectors in lanes.
+#[inline(always)]
+fn lanes<S: Simd>(simd: S, vectors: &[DVec3; 8]) -> [Lanes<S>; 3] {
+    let mut all = [Lanes::<S>::splat(simd, 0.0); 3];
+    for axis in 0..3 {
+        let mut along = [0.0; 8];
+        for k in 0..8 {
+            along[k] = vectors[k][axis];
+        }
+        all[axis] = Lanes::<S>::from_slice(simd, &along);
+    }
+    all
 }

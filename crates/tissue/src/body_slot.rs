@@ -129,7 +129,7 @@ impl<S: Solver> BodySlot<S> {
             island: index,
             reaction: Reaction::new(body),
             untangler: Untangler::new(&rest),
-            measured: Measured::new(body.len()),
+            measured: Measured::new(),
             before: rest.clone(),
             state: rest,
         }
@@ -139,18 +139,14 @@ impl<S: Solver> BodySlot<S> {
     pub fn begin_frame(&mut self, state: &mut BodyState, frame: &Frame<'_>) {
         self.report = StepReport::default();
         self.before.copy_from(state);
-        // Tetrahedra in a lattice bear nothing.
-        match (&self.body.lattice, &mut state.lattice) {
-            (None, _) => {
-                self.untangler.untangle(&frame.of(self.index), &self.body, state);
-                state.follow_nodes(&self.body);
-            }
+        if self.body.lattice.is_none() {
+            // Tetrahedra in a lattice bear nothing.
+            self.untangler.untangle(&frame.of(self.index), &self.body, state);
+            state.follow_nodes(&self.body);
+        } else if !self.body.bound.is_empty() {
             // A collision surface is where contact between bodies is looked for before they are
             // solved.
-            (Some(embedding), Some(lattice)) if !self.body.bound.is_empty() => {
-                embedding.follow(lattice, &mut state.x, &mut state.v);
-            }
-            _ => {}
+            state.join_lattice(&self.body);
         }
     }
 

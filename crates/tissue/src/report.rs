@@ -2,7 +2,7 @@
 
 use crate::Body;
 use crate::state::BodyState;
-use glam::Vec3A;
+use glam::{DVec3, Vec3A};
 
 /// Speed at which a node has diverged (m/s): the paper's particle velocity limit.
 pub const SPEED_LIMIT: f64 = 20.0;
@@ -90,18 +90,73 @@ impl Default for StepReport {
     }
 }
 
-/// Measures of a body, and its positions then.
+/// What is measured of a body's shape.
+#[derive(Clone, Copy)]
+struct Shape {
+    /// Whether all positions are numbers; nothing else is measured if not.
+    finite: bool,
+    inverted: usize,
+    min_volume_ratio: f64,
+    /// Whether an edge is too long.
+    stretched: bool,
+}
+
+/// The shape of a body, and where it was then: most bodies have not moved since the last frame.
 pub(crate) struct Measured {
     x: Vec<Vec3A>,
-    v: Vec<Vec3A>,
-    report: StepReport,
+    /// Of its lattice, if it has one.
+    nodes: Vec<DVec3>,
+    shape: Option<Shape>,
 }
 
 impl Measured {
-    /// Nothing yet, of a body of so many vertices.
-    pub fn new(vertices: usize) -> Self {
-        let nowhere = vec![Vec3A::NAN; vertices];
-        Self { x: nowhere.clone(), v: nowhere, report: StepReport::default() }
+    /// Nothing yet.
+    pub fn new() -> Self {
+        Self { x: Vec::new(), nodes: Vec::new(), shape: None }
+    }
+
+    /// The shape of the body.
+    fn shape(&mut self, body: &Body, state: &BodyState) -> Shape {
+        let nodes = state.lattice.as_ref().map_or(&[][..], |lattice| &lattice.positions);
+        if let Some(shape) = self.shape.filter(|_| self.x == state.x && self.nodes == nodes) {
+            return shape;
+        }
+        let shape = Shape::of(body, state);
+        self.x.clone_from(&state.x);
+        self.nodes.clear();
+        self.nodes.extend_from_slice(nodes);
+        self.shape = Some(shape);
+        shape
+    }
+}
+
+impl Shape {
+    fn of(body: &Body, state: &BodyState) -> Self {
+        let mut shape = Self { finite: true, inverted: 0, min_volume_ratio: f64::INFINITY, stretched: false };
+        if !state.x.iter().all(|p| p.is_finite()) {
+            return Self { finite: false, ..shape };
+        }
+        let mut count = |ratio: f64| {
+            shape.inverted += usize::from(ratio <= 0.0);
+            shape.min_volume_ratio = shape.min_volume_ratio.min(ratio);
+        };
+        if let (Some(embedding), Some(lattice)) = (&body.lattice, &state.lattice) {
+            // Tetrahedra in a lattice bear nothing; its cells do.
+            embedding.body.volume_ratios(&lattice.positions).for_each(count);
+        } else {
+            for (tet, rest) in body.tets.iter().zip(&body.volumes) {
+                let [a, b, c, d] = tet.map(|i| state.x[i as usize]);
+                count(f64::from((b - a).cross(c - a).dot(d - a)) / 6.0 / rest);
+            }
+        }
+        shape.stretched = (0..body.len()).any(|i| {
+            let too_long = |length: f32, j: u32| {
+                (state.x[j as usize] - state.x[i]).length_squared() > (STRETCH_LIMIT * length).powi(2)
+            };
+            // Every edge appears at both its ends.
+            body.edges_of(i).iter().any(|e| e.to as usize > i && too_long(e.length, e.to))
+        });
+        shape
     }
 }
 
@@ -123,52 +178,24 @@ impl StepReport {
         }
     }
 
-    /// Adds the measures of a body at the end of the frame. `last` keeps them for a body that does
-    /// not move.
+    /// Adds the measures of a body at the end of the frame: speed, volumes, and the events that end
+    /// a run. `last` keeps the shape for a body that does not move.
     pub(crate) fn measure(&mut self, index: usize, body: &Body, state: &BodyState, last: &mut Measured) {
-        if last.report.divergence.is_some() || state.x != last.x || state.v != last.v {
-            let mut now = Self::default();
-            now.measure_body(index, body, state);
-            last.x.clone_from(&state.x);
-            last.v.clone_from(&state.v);
-            last.report = now;
-        }
-        let Self { max_speed, inverted, min_volume_ratio, divergence, .. } = last.report;
-        *self = Self { max_speed, inverted, min_volume_ratio, divergence: divergence.or(self.divergence), ..*self };
-    }
-
-    /// Measures a body: speed, volumes, and the events that end a run.
-    fn measure_body(&mut self, index: usize, body: &Body, state: &BodyState) {
-        let finite = state.x.iter().chain(&state.v).all(|p| p.is_finite());
-        if !finite {
-            self.divergence = Some(Divergence::NonFinite { body: index });
+        let Shape { finite, inverted, min_volume_ratio, stretched } = last.shape(body, state);
+        if !finite || !state.v.iter().all(|v| v.is_finite()) {
+            let divergence = Some(Divergence::NonFinite { body: index });
+            *self = Self { max_speed: 0.0, inverted: 0, min_volume_ratio: f64::INFINITY, divergence, ..*self };
             return;
         }
-        self.max_speed = f64::from(state.v[..body.len()].iter().map(|v| v.length_squared()).fold(0.0, f32::max)).sqrt();
-        let mut count = |ratio: f64| {
-            self.inverted += usize::from(ratio <= 0.0);
-            self.min_volume_ratio = self.min_volume_ratio.min(ratio);
-        };
-        if let (Some(embedding), Some(lattice)) = (&body.lattice, &state.lattice) {
-            // Tetrahedra in a lattice bear nothing; its cells do.
-            embedding.body.volume_ratios(&lattice.positions).for_each(count);
-        } else {
-            for (tet, rest) in body.tets.iter().zip(&body.volumes) {
-                let [a, b, c, d] = tet.map(|i| state.x[i as usize]);
-                count(f64::from((b - a).cross(c - a).dot(d - a)) / 6.0 / rest);
-            }
-        }
-        let stretched = (0..body.len()).any(|i| {
-            let too_long = |length: f32, j: u32| {
-                (state.x[j as usize] - state.x[i]).length_squared() > (STRETCH_LIMIT * length).powi(2)
-            };
-            // Every edge appears at both its ends.
-            body.edges_of(i).iter().any(|e| e.to as usize > i && too_long(e.length, e.to))
-        });
-        if self.max_speed >= SPEED_LIMIT {
-            self.divergence = Some(Divergence::OverSpeed { body: index });
+        let fastest = state.v[..body.len()].iter().map(|v| v.length_squared()).fold(0.0, f32::max);
+        let max_speed = f64::from(fastest).sqrt();
+        let divergence = if max_speed >= SPEED_LIMIT {
+            Some(Divergence::OverSpeed { body: index })
         } else if stretched {
-            self.divergence = Some(Divergence::OverStretch { body: index });
-        }
+            Some(Divergence::OverStretch { body: index })
+        } else {
+            self.divergence
+        };
+        *self = Self { max_speed, inverted, min_volume_ratio, divergence, ..*self };
     }
 }

@@ -3,7 +3,7 @@
 use crate::LatticeSettings;
 use glam::{DVec3, Vec3A};
 use std::sync::Arc;
-use trocar_lattice::{Body as LatticeBody, BodyState as LatticeState, EmbeddedPoint, RestStiffness};
+use trocar_lattice::{Body as LatticeBody, BodyState as LatticeState, EmbeddedPoint, Motion, RestStiffness};
 
 /// Rounds of the search for a lattice whose nodes are at given places.
 const FIT_ROUNDS: usize = 40;
@@ -80,14 +80,10 @@ impl Embedding {
         piece
     }
 
-    /// Writes positions and velocities of the vertices that the lattice moves.
-    pub fn write(&self, lattice: &LatticeState, x: &mut [Vec3A], v: &mut [Vec3A]) {
-        for (i, point) in self.points.iter().enumerate() {
-            if let Some(point) = point {
-                x[i] = point.interpolate(&lattice.positions).as_vec3a();
-                v[i] = point.interpolate(&lattice.velocities).as_vec3a();
-            }
-        }
+    /// Writes positions and velocities of the vertices that the lattice moves. `motion` is scratch.
+    pub fn write(&self, lattice: &LatticeState, motion: &mut Motion, x: &mut [Vec3A], v: &mut [Vec3A]) {
+        motion.load(lattice);
+        motion.write(&self.points, x, v);
     }
 
     /// Makes the lattice follow vertices that were moved from outside (positions `x`, velocities
@@ -95,7 +91,7 @@ impl Embedding {
     pub fn follow(&self, lattice: &mut LatticeState, x: &mut [Vec3A], v: &mut [Vec3A]) {
         self.fit(x, &mut lattice.positions);
         self.fit(v, &mut lattice.velocities);
-        self.write(lattice, x, v);
+        self.write(lattice, &mut Motion::default(), x, v);
     }
 
     /// Fits a field over the lattice to one over the vertices. Every node takes the mean of what

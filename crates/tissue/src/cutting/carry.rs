@@ -173,6 +173,7 @@ fn motion(whole: &Body, state: &BodyState, piece: &Body, nodes: &[u32]) -> BodyS
             supported: from.iter().map(|i| state.warm.supported[*i]).collect(),
         },
         lattice: piece.lattice.as_ref().map(|lattice| lattice.at_rest()),
+        follows: false,
     }
 }
 

@@ -10,6 +10,7 @@
 use super::system::{Elastic, Lattice};
 use super::terms::Term;
 use glam::DVec3;
+use std::rc::Rc;
 
 /// Pairs of steps and changes of the gradient that L-BFGS keeps.
 const MEMORY: usize = 12;
@@ -54,11 +55,11 @@ pub(super) struct Outcome {
     pub converged: bool,
 }
 
-/// An island in a substep.
-pub(super) struct Island<'a> {
+/// An island in a substep: lattices of slots, and terms that point into bodies.
+pub(super) struct Island<'s, 'b> {
     /// The bodies that can move.
-    pub lattices: Vec<Lattice<'a>>,
-    pub terms: Vec<Term>,
+    pub lattices: Vec<Lattice<'s>>,
+    pub terms: Vec<Term<'b>>,
     /// Positions of the nodes of the lattice of each body (m); none of bodies that cannot move.
     pub x: Vec<Vec<DVec3>>,
     pub precision: Precision,
@@ -68,8 +69,8 @@ pub(super) struct Island<'a> {
 struct Value {
     energy: f64,
     gradient: Vec<Vec<DVec3>>,
-    /// Without the terms, by body.
-    elastic: Vec<Elastic>,
+    /// Without the terms, by body; shared with the values where the body was at the same place.
+    elastic: Vec<Rc<Elastic>>,
     /// Where the points of the terms are (m).
     points: Vec<DVec3>,
 }
@@ -83,15 +84,14 @@ pub(super) struct Precision {
     pub relative: f64,
 }
 
-impl Island<'_> {
+impl Island<'_, '_> {
     /// Moves the lattices to the minimum of the potential.
     pub fn minimise(&mut self) -> Outcome {
         let first = self.first_elastic();
         let points = self.points(&self.x);
         self.update_limits(&points);
-        let start = self.x.clone();
         let mut value = self.with_terms(points, first);
-        let mut pairs: Vec<Pair> = Vec::new();
+        let (mut start, mut pairs) = (None, Vec::new());
         let (mut outcome, mut of_factor, mut projected) = (Outcome::default(), 0, false);
         loop {
             if !value.energy.is_finite() || self.is_balanced(&value) {
@@ -132,11 +132,12 @@ impl Island<'_> {
                 }
                 pairs.push(Pair { step: moved(step), change: moved(change), inverse: 1.0 / curvature });
             }
-            self.x = x;
+            let before = std::mem::replace(&mut self.x, x);
+            let start = start.get_or_insert(before);
             outcome.steps += 1;
             of_factor += 1;
             value = if self.update_limits(&next.points) { self.with_terms(next.points, next.elastic) } else { next };
-            let way = longest(&difference(&self.x, &start));
+            let way = longest(&difference(&self.x, start));
             if share == 1.0 && reached <= self.precision.tolerance.max(self.precision.relative * way) {
                 outcome.converged = true;
                 return outcome;
@@ -146,22 +147,22 @@ impl Island<'_> {
 
     /// The elastic parts where the search starts. A body whose guess turns a cell inside out starts
     /// where it was.
-    fn first_elastic(&mut self) -> Vec<Elastic> {
+    fn first_elastic(&mut self) -> Vec<Rc<Elastic>> {
         let Self { lattices, x, .. } = self;
-        let first = lattices.iter().map(|lattice| {
+        let first = lattices.iter_mut().map(|lattice| {
             let x = &mut x[lattice.member];
             let elastic = lattice.first_elastic(x);
             if elastic.least_ratio >= MIN_VOLUME_RATIO {
                 return elastic;
             }
-            let before = lattice.elastic(&lattice.start);
+            let before = lattice.first_elastic(lattice.start);
             if before.least_ratio <= elastic.least_ratio {
                 return elastic;
             }
-            x.clone_from(&lattice.start);
+            x.clone_from_slice(lattice.start);
             before
         });
-        first.collect()
+        first.map(Rc::new).collect()
     }
 
     /// Where the points of the terms are with the nodes at `x` (m).
@@ -186,13 +187,13 @@ impl Island<'_> {
     fn evaluate(&self, x: &[Vec<DVec3>], direction: &[Vec<DVec3>], before: &Value) -> Value {
         let elastic = self.lattices.iter().zip(&before.elastic).map(|(lattice, before)| {
             let moves = direction[lattice.member].iter().any(|d| *d != DVec3::ZERO);
-            if moves { lattice.elastic(&x[lattice.member]) } else { before.clone() }
+            if moves { Rc::new(lattice.elastic(&x[lattice.member])) } else { Rc::clone(before) }
         });
         self.with_terms(self.points(x), elastic.collect())
     }
 
     /// Adds the terms with their points at `points` to the elastic part.
-    fn with_terms(&self, points: Vec<DVec3>, elastic: Vec<Elastic>) -> Value {
+    fn with_terms(&self, points: Vec<DVec3>, elastic: Vec<Rc<Elastic>>) -> Value {
         let mut gradient: Vec<Vec<DVec3>> = vec![Vec::new(); self.x.len()];
         let mut energy = 0.0;
         for (lattice, elastic) in self.lattices.iter().zip(&elastic) {
@@ -269,7 +270,7 @@ impl Island<'_> {
 }
 
 fn balanced(lattice: &Lattice<'_>, gradient: &[DVec3]) -> bool {
-    let tolerance = TOLERANCE * EARTH * lattice.mass;
+    let tolerance = TOLERANCE * EARTH * lattice.mass();
     gradient.iter().map(|g| g.length_squared()).sum::<f64>() <= tolerance * tolerance
 }
 

@@ -7,8 +7,11 @@
 //! and viscosity are those of the lattice.
 
 mod minimise;
+mod start;
 mod system;
 mod terms;
+#[cfg(test)]
+mod tests;
 
 use crate::body_slot::{BodySlot, IslandFrame, Solver};
 use crate::contact::ContactSet;
@@ -16,10 +19,11 @@ use crate::frame::Frame;
 use crate::{Body, QuasiNewton, SolverSettings, ToolForce};
 use glam::DVec3;
 use minimise::{Island, Precision};
+use start::Start;
 use system::{Lattice, LatticeSystem};
 use terms::{Place, Share, Term};
 use trocar_core::Wrench;
-use trocar_lattice::BodyState as LatticeState;
+use trocar_lattice::Motion;
 
 /// Stiffness of the spring of a rigidly held vertex, over Young's modulus times the edge of a cell.
 /// A vertex that a newton pulls out of tissue of 12 kPa in cells of 4 mm is off by 2 um.
@@ -38,6 +42,10 @@ pub(crate) struct LatticeSolver {
     forces: Vec<ToolForce>,
     /// Whether another body presses it when a substep begins.
     pressed: bool,
+    /// Where it begins the substep.
+    start: Start,
+    /// Scratch: what the vertices are written from.
+    motion: Motion,
 }
 
 /// A rigidly held vertex in a frame.
@@ -66,6 +74,8 @@ impl LatticeSolver {
             held: Vec::new(),
             forces: Vec::new(),
             pressed: false,
+            start: Start::default(),
+            motion: Motion::default(),
         }
     }
 }
@@ -84,9 +94,7 @@ impl Solver for LatticeSolver {
         for BodySlot { index, body, solver, state, .. } in island.slots.iter_mut() {
             let frame = island.frame.of(*index);
             state.disturbed = false;
-            if let (Some(embedding), Some(lattice)) = (&body.lattice, &mut state.lattice) {
-                embedding.follow(lattice, &mut state.x, &mut state.v);
-            }
+            state.join_lattice(body);
             if let Some(system) = &mut solver.system {
                 system.forget_factor();
             }
@@ -118,20 +126,24 @@ impl Solver for LatticeSolver {
             slots[member].solver.pressed = pairs.presses(&**slots, member);
         }
         let h = frame.dt * (to - from);
+        // Terms point into them while the slots change.
+        let bodies: Vec<Body> = slots.iter().map(|slot| slot.body.clone()).collect();
         let mut terms = Vec::new();
-        for (member, BodySlot { body, solver, state, .. }) in slots.iter().enumerate() {
-            terms::push_contacts(member, (body, &state.x), solver.contacts.list(), &mut terms);
+        for (member, (slot, body)) in slots.iter().zip(&bodies).enumerate() {
+            terms::push_contacts(member, (body, &slot.state.x), slot.solver.contacts.list(), &mut terms);
         }
         let first_pair = terms.len();
-        terms::push_pairs(|m| (&slots[m].body, &slots[m].state.x[..]), pairs, &mut terms);
+        terms::push_pairs(|m| (&bodies[m], &slots[m].state.x[..]), pairs, &mut terms);
         let first_held = terms.len();
-        slots.iter().enumerate().for_each(|(member, slot)| hold(slot, member, frame, to, &mut terms));
+        for (member, (slot, body)) in slots.iter().zip(&bodies).enumerate() {
+            hold(&slot.solver.held, member, body, frame, to, &mut terms);
+        }
 
+        slots.iter_mut().for_each(|slot| Start::begin(slot, frame, h));
         let precision = slots[0].solver.precision;
-        let starts: Vec<Start> = slots.iter().map(|slot| Start::of(slot, frame, h)).collect();
-        let x = starts.iter().map(|start| start.guess.clone()).collect();
-        let lattices = slots.iter_mut().zip(&starts).enumerate();
-        let lattices = lattices.filter_map(|(member, (slot, start))| lattice(slot, member, start, h)).collect();
+        let x = slots.iter_mut().map(|slot| std::mem::take(&mut slot.solver.start.guess)).collect();
+        let lattices = slots.iter_mut().zip(&bodies).enumerate();
+        let lattices = lattices.filter_map(|(member, (slot, body))| lattice(slot, member, body, h)).collect();
         let mut search = Island { lattices, terms, x, precision };
         let outcome = search.minimise();
         let Island { terms, x, .. } = search;
@@ -139,17 +151,19 @@ impl Solver for LatticeSolver {
         for (pair, term) in pairs.list_mut().iter_mut().zip(&terms[first_pair..first_held]) {
             pair.limit = term.limit as f32;
         }
-        for ((slot, start), x) in slots.iter_mut().zip(starts).zip(&x) {
-            let BodySlot { body, state, report, .. } = slot;
+        for (slot, x) in slots.iter_mut().zip(&x) {
+            let BodySlot { body, solver, state, report, .. } = slot;
             report.iterations += outcome.steps;
             report.fallbacks += usize::from(!outcome.converged);
-            if let (Some(embedding), Some(lattice)) = (&body.lattice, &mut state.lattice) {
-                start.end(x, h, lattice);
-                embedding.write(lattice, &mut state.x, &mut state.v);
+            if let (Some(embedding), Some(lattice)) = (&body.lattice, &mut state.lattice)
+                && solver.start.end(x, h, lattice)
+            {
+                embedding.write(lattice, &mut solver.motion, &mut state.x, &mut state.v);
             }
         }
-        let x: Vec<&[DVec3]> = x.iter().map(|x| &x[..]).collect();
-        press_tools(slots, &terms[first_held..], &x, frame);
+        let places: Vec<&[DVec3]> = x.iter().map(|x| &x[..]).collect();
+        press_tools(slots, &terms[first_held..], &places, frame);
+        slots.iter_mut().zip(x).for_each(|(slot, x)| slot.solver.start.guess = x);
         island.end_contacts(to);
     }
 
@@ -170,91 +184,34 @@ impl Solver for LatticeSolver {
     }
 }
 
-/// Where a lattice begins a substep.
-struct Start {
-    /// Acceleration times time that free flight adds to the velocity (m/s), and the predictor (m).
-    flight: DVec3,
-    predictor: Vec<DVec3>,
-    /// Forces on the nodes (N).
-    loads: Vec<DVec3>,
-    /// Where the search starts (m).
-    guess: Vec<DVec3>,
-}
-
-impl Start {
-    /// Of a body in a substep of `h` (s). Empty for a body that cannot move.
-    ///
-    /// A body in free flight falls exactly: gravity's part of its motion is h^2/2 g. Elsewhere it
-    /// is implicit Euler's h^2 g.
-    fn of(slot: &BodySlot<LatticeSolver>, frame: &Frame<'_>, h: f64) -> Self {
-        let BodySlot { index, body, solver, state, .. } = slot;
-        let mut start = Self { flight: DVec3::ZERO, predictor: Vec::new(), loads: Vec::new(), guess: Vec::new() };
-        let (Some(embedding), Some(lattice)) = (&body.lattice, &state.lattice) else { return start };
-        start.loads.resize(lattice.positions.len(), DVec3::ZERO);
-        let mut loaded = false;
-        frame.of(*index).for_loads(body, |vertex, force| {
-            if let Some(point) = &embedding.points[vertex] {
-                point.spread(force, &mut start.loads);
-                loaded = true;
-            }
-        });
-        let free = !loaded && !solver.pressed && solver.held.is_empty() && embedding.body.pins().is_empty();
-        let flies = free && solver.contacts.is_idle(|i| state.x[i]);
-        start.flight = h * frame.gravity;
-        let reach = if flies { 0.5 * h } else { h };
-        let nodes = || lattice.positions.iter().zip(&lattice.velocities);
-        start.predictor.extend(nodes().map(|(x, v)| *x + h * *v + reach * start.flight));
-        if flies {
-            start.guess.clone_from(&start.predictor);
-        } else {
-            // A body that hardly moves starts where it is, and may come to rest.
-            let fastest = lattice.velocities.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
-            let share = if h * fastest > solver.precision.tolerance { h } else { 0.0 };
-            start.guess.extend(nodes().map(|(x, v)| *x + share * *v));
-        }
-        start
-    }
-
-    /// Ends the substep at `x`: v + h g + (x - y)/h, which equals (x - x0)/h for implicit Euler,
-    /// and is exact in free flight.
-    fn end(&self, x: &[DVec3], h: f64, lattice: &mut LatticeState) {
-        for (i, x) in x.iter().enumerate() {
-            lattice.velocities[i] += self.flight + (*x - self.predictor[i]) / h;
-            lattice.positions[i] = *x;
-        }
-    }
-}
-
 /// The lattice of a body that can move, in a substep of `h` (s).
-fn lattice<'a>(slot: &'a mut BodySlot<LatticeSolver>, member: usize, start: &Start, h: f64) -> Option<Lattice<'a>> {
-    let BodySlot { body, solver, state, .. } = slot;
-    let (embedding, system, state) = (body.lattice.clone()?, solver.system.as_mut()?, state.lattice.as_ref()?);
-    let (mass, viscosity) = (embedding.body.masses().iter().sum(), body.material.viscosity);
-    let (predictor, loads) = (start.predictor.clone(), start.loads.clone());
-    let from = state.positions.clone();
-    let mut lattice = Lattice { member, embedding, system, h, predictor, loads, mass, viscosity, start: from };
-    lattice.begin_substep(&start.guess);
-    Some(lattice)
+fn lattice<'a>(slot: &'a mut BodySlot<LatticeSolver>, member: usize, body: &'a Body, h: f64) -> Option<Lattice<'a>> {
+    let LatticeSolver { system, start, .. } = &mut slot.solver;
+    let (embedding, system, state) = (body.lattice.as_deref()?, system.as_mut()?, slot.state.lattice.as_ref()?);
+    let (predictor, loads, viscosity) = (&start.predictor[..], &start.loads[..], body.material.viscosity);
+    system.begin_substep();
+    Some(Lattice { member, embedding, system, h, predictor, loads, viscosity, start: &state.positions })
 }
 
-/// Appends the springs of rigidly held vertices, whose tools are where they are when `share` of the
-/// frame is over.
-fn hold(slot: &BodySlot<LatticeSolver>, member: usize, frame: &Frame<'_>, share: f64, terms: &mut Vec<Term>) {
-    let Some(embedding) = &slot.body.lattice else { return };
-    let stiffness = HOLD_STIFFNESS * slot.body.material.young_modulus * embedding.settings.cell;
-    for held in &slot.solver.held {
+/// Appends the springs of rigidly held vertices of a body, whose tools are where they are when
+/// `share` of the frame is over.
+fn hold<'a>(held: &[Held], member: usize, body: &'a Body, frame: &Frame<'_>, share: f64, terms: &mut Vec<Term<'a>>) {
+    let Some(embedding) = body.lattice.as_deref() else { return };
+    let stiffness = HOLD_STIFFNESS * body.material.young_modulus * embedding.settings.cell;
+    for held in held {
         let grasp = &frame.grasps[held.grasp];
         let place = frame
             .tools
             .get(grasp.tool)
-            .map_or(held.place, |tool| grasp.prescribed_node(&tool.at(share), held.node).1 - slot.body.origin);
-        let at = embedding.points[held.vertex as usize].map_or(Place::Fixed(held.place), Place::Embedded);
+            .map_or(held.place, |tool| grasp.prescribed_node(&tool.at(share), held.node).1 - body.origin);
+        let point = embedding.points[held.vertex as usize].as_ref();
+        let at = point.map_or(Place::Fixed(held.place), Place::Embedded);
         terms.push(Term::spring(Share { member, share: 1.0, place: at }, place, stiffness));
     }
 }
 
 /// Measures the forces of rigidly held vertices on their tools, from the springs that `hold` made.
-fn press_tools(slots: &mut [BodySlot<LatticeSolver>], springs: &[Term], x: &[&[DVec3]], frame: &Frame<'_>) {
+fn press_tools(slots: &mut [BodySlot<LatticeSolver>], springs: &[Term<'_>], x: &[&[DVec3]], frame: &Frame<'_>) {
     let mut springs = springs.iter();
     for slot in slots {
         let LatticeSolver { held, forces, .. } = &mut slot.solver;

@@ -2,7 +2,7 @@
 //! preconditions it.
 
 use super::terms::Term;
-use crate::body::{Embedding, EmbeddingData};
+use crate::body::EmbeddingData;
 use glam::{DMat3, DVec3};
 use trocar_lattice::Flow;
 use trocar_sparse::{BlockMatrix, Cholesky, Level};
@@ -14,19 +14,18 @@ const SHIFTS: [f64; 3] = [0.0, 1e-8, 1e-4];
 pub(super) struct Lattice<'a> {
     /// Its number in the island.
     pub member: usize,
-    pub embedding: Embedding,
+    pub embedding: &'a EmbeddingData,
     pub system: &'a mut LatticeSystem,
     /// Length of the substep (s).
     pub h: f64,
     /// Where the nodes would be without forces (m).
-    pub predictor: Vec<DVec3>,
-    /// Forces on the nodes (N).
-    pub loads: Vec<DVec3>,
-    /// Mass (kg), and shear viscosity (Pa s).
-    pub mass: f64,
+    pub predictor: &'a [DVec3],
+    /// Forces on the nodes (N); none without loads.
+    pub loads: &'a [DVec3],
+    /// Shear viscosity (Pa s).
     pub viscosity: f64,
     /// Where the nodes begin (m).
-    pub start: Vec<DVec3>,
+    pub start: &'a [DVec3],
 }
 
 /// Matrix and factor of a lattice. The factor never outlives a frame.
@@ -38,8 +37,10 @@ pub(super) struct LatticeSystem {
     flow: Flow,
     /// Whether `flow` is that of the substep.
     flows: bool,
-    /// The elastic part where the last substep began: of a body at rest nothing else is needed.
+    /// Of a body that begins where it began before, elasticity and viscosity are known there.
     known: Option<Known>,
+    /// Mass of the lattice (kg).
+    mass: f64,
 }
 
 /// Elastic energy (J) and its gradient (N), with inertia, viscosity, pins and loads, and the least
@@ -51,13 +52,10 @@ pub(super) struct Elastic {
     pub least_ratio: f64,
 }
 
-/// An elastic part and all that it depends on.
+/// An elastic part without inertia and loads where a substep began, and all that it depends on.
 struct Known {
     h: f64,
     start: Vec<DVec3>,
-    predictor: Vec<DVec3>,
-    loads: Vec<DVec3>,
-    x: Vec<DVec3>,
     elastic: Elastic,
 }
 
@@ -75,7 +73,13 @@ impl LatticeSystem {
             flow: Flow::default(),
             flows: false,
             known: None,
+            mass: embedding.body.masses().iter().sum(),
         }
+    }
+
+    /// Begins a substep: viscosity is no longer that of the last one.
+    pub fn begin_substep(&mut self) {
+        self.flows = false;
     }
 
     /// The next preconditioning makes a new factor.
@@ -90,63 +94,77 @@ impl LatticeSystem {
 }
 
 impl Lattice<'_> {
-    /// Begins a substep whose search starts at `x`.
-    pub fn begin_substep(&mut self, x: &[DVec3]) {
-        self.system.flows = false;
-        let known = self.system.known.as_ref().is_some_and(|known| {
-            known.h == self.h
-                && known.start == self.start
-                && known.predictor == self.predictor
-                && known.loads == self.loads
-                && known.x == x
-        });
-        if !known {
-            self.flow();
-            let elastic = self.elastic(x);
-            let (start, predictor, loads) = (self.start.clone(), self.predictor.clone(), self.loads.clone());
-            self.system.known = Some(Known { h: self.h, start, predictor, loads, x: x.to_vec(), elastic });
-        }
+    /// Mass (kg).
+    pub fn mass(&self) -> f64 {
+        self.system.mass
     }
 
     /// The elastic part where the search starts, at `x`.
-    pub fn first_elastic(&self, x: &[DVec3]) -> Elastic {
-        self.system.known.as_ref().map_or_else(|| self.elastic(x), |known| known.elastic.clone())
+    pub fn first_elastic(&mut self, x: &[DVec3]) -> Elastic {
+        let mut first = if x == self.start {
+            self.at_start()
+        } else {
+            self.flow();
+            self.tissue(x)
+        };
+        self.add_inertia(x, &mut first);
+        first
+    }
+
+    /// The elastic part without inertia and loads where the substep begins.
+    fn at_start(&mut self) -> Elastic {
+        let known = self.system.known.as_ref();
+        if let Some(known) = known.filter(|known| known.h == self.h && known.start == self.start) {
+            return known.elastic.clone();
+        }
+        self.flow();
+        let elastic = self.tissue(self.start);
+        self.system.known = Some(Known { h: self.h, start: self.start.to_vec(), elastic: elastic.clone() });
+        elastic
     }
 
     /// Makes the viscosity that of the substep.
     fn flow(&mut self) {
         if !std::mem::replace(&mut self.system.flows, true) {
-            self.system.flow.begin(&self.embedding.body, self.viscosity, self.h, &self.start);
+            self.system.flow.begin(&self.embedding.body, self.viscosity, self.h, self.start);
         }
     }
 
-    /// The elastic part at `x`.
+    /// The elastic part at `x`, once the search has moved the body.
     pub fn elastic(&self, x: &[DVec3]) -> Elastic {
-        let mut gradient = vec![DVec3::ZERO; x.len()];
-        let (energy, least_ratio) = self.evaluate(x, &mut gradient);
-        Elastic { energy, gradient, least_ratio }
+        let mut elastic = self.tissue(x);
+        self.add_inertia(x, &mut elastic);
+        elastic
     }
 
-    /// Energy at `x` (J), and the least ratio of volumes; adds the energy's gradient (N).
-    fn evaluate(&self, x: &[DVec3], gradient: &mut [DVec3]) -> (f64, f64) {
+    /// The same without inertia and loads.
+    fn tissue(&self, x: &[DVec3]) -> Elastic {
         let lattice = &self.embedding.body;
-        let (mut energy, least) = lattice.add_elastic(x, &self.system.flow, gradient);
+        let mut gradient = vec![DVec3::ZERO; x.len()];
+        let (mut energy, least_ratio) = lattice.add_elastic(x, &self.system.flow, &mut gradient);
         for pin in lattice.pins() {
             let away = pin.point.interpolate(x) - pin.target;
             energy += 0.5 * pin.stiffness * away.length_squared();
-            pin.point.spread(pin.stiffness * away, gradient);
+            pin.point.spread(pin.stiffness * away, &mut gradient);
         }
-        for (i, mass) in lattice.masses().iter().enumerate() {
-            let away = x[i] - self.predictor[i];
+        Elastic { energy, gradient, least_ratio }
+    }
+
+    /// Adds inertia and loads.
+    fn add_inertia(&self, x: &[DVec3], to: &mut Elastic) {
+        let nodes = self.embedding.body.masses().iter().zip(x).zip(self.predictor).zip(&mut to.gradient);
+        let mut loads = self.loads.iter();
+        for (((mass, x), predictor), gradient) in nodes {
+            let away = *x - *predictor;
             let force = (mass / (self.h * self.h)) * away;
-            energy += 0.5 * force.dot(away) - self.loads[i].dot(away);
-            gradient[i] += force - self.loads[i];
+            let load = loads.next().copied().unwrap_or(DVec3::ZERO);
+            to.energy += 0.5 * force.dot(away) - load.dot(away);
+            *gradient += force - load;
         }
-        (energy, least)
     }
 
     /// Turns a vector over the nodes into the solution of the matrix.
-    pub fn precondition(&mut self, terms: &[Term], x: &[&[DVec3]], projected: bool, vector: &mut [DVec3]) {
+    pub fn precondition(&mut self, terms: &[Term<'_>], x: &[&[DVec3]], projected: bool, vector: &mut [DVec3]) {
         self.flow();
         if !self.system.factorised {
             self.factorise(terms, x, projected);
@@ -161,7 +179,7 @@ impl Lattice<'_> {
         }
     }
 
-    fn factorise(&mut self, terms: &[Term], x: &[&[DVec3]], projected: bool) {
+    fn factorise(&mut self, terms: &[Term<'_>], x: &[&[DVec3]], projected: bool) {
         let lattice = &self.embedding.body;
         let LatticeSystem { matrix, cholesky, factorised, flow, .. } = &mut *self.system;
         matrix.clear();

@@ -2,25 +2,24 @@
 //! potential in double precision.
 
 use crate::Body;
-use crate::body::EmbeddingData;
 use crate::contact::{Contact, Friction, Pairs};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3A};
 use trocar_lattice::EmbeddedPoint;
 
 /// A vertex with its share of a term.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Share {
+pub(super) struct Share<'a> {
     /// The body, by its number in the island.
     pub member: usize,
     pub share: f64,
-    pub place: Place,
+    pub place: Place<'a>,
 }
 
 /// Where a vertex is.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Place {
+pub(super) enum Place<'a> {
     /// It moves with a lattice.
-    Embedded(EmbeddedPoint),
+    Embedded(&'a EmbeddedPoint),
     /// It does not move (m).
     Fixed(DVec3),
 }
@@ -36,8 +35,8 @@ enum Law {
 
 /// One term: a point of the island at a plane or a place.
 #[derive(Clone, Debug)]
-pub(super) struct Term {
-    shares: [Option<Share>; 4],
+pub(super) struct Term<'a> {
+    shares: [Option<Share<'a>>; 4],
     /// Added to the weighted sum of the vertices (m).
     shift: DVec3,
     /// Where friction or the spring holds the point (m).
@@ -71,14 +70,14 @@ impl Response {
     }
 }
 
-impl Term {
+impl<'a> Term<'a> {
     /// A spring of `stiffness` (N/m) from a point to a place (m).
-    pub fn spring(share: Share, place: DVec3, stiffness: f64) -> Self {
+    pub fn spring(share: Share<'a>, place: DVec3, stiffness: f64) -> Self {
         let shares = [Some(share), None, None, None];
         Self { shares, shift: DVec3::ZERO, place, stiffness, law: Law::Spring, limit: 0.0 }
     }
 
-    fn contact(contact: &Contact, shares: [Option<Share>; 4], shift: DVec3) -> Self {
+    fn contact(contact: &Contact, shares: [Option<Share<'a>>; 4], shift: DVec3) -> Self {
         let law = Law::Contact {
             normal: contact.normal.as_dvec3(),
             point: contact.point.as_dvec3(),
@@ -91,13 +90,13 @@ impl Term {
     }
 
     /// The shares of the point.
-    pub fn shares(&self) -> impl Iterator<Item = &Share> {
+    pub fn shares(&self) -> impl Iterator<Item = &Share<'a>> {
         self.shares.iter().flatten()
     }
 
     /// The point, with the lattices' nodes at `x` (m).
     pub fn at(&self, x: &[&[DVec3]]) -> DVec3 {
-        let of = |share: &Share| match &share.place {
+        let of = |share: &Share<'_>| match &share.place {
             Place::Embedded(point) => share.share * point.interpolate(x[share.member]),
             Place::Fixed(place) => share.share * *place,
         };
@@ -189,33 +188,31 @@ impl Term {
 }
 
 /// A vertex of a body.
-fn share(member: usize, embedding: Option<&EmbeddingData>, x: &[glam::Vec3A], vertex: u32, share: f64) -> Share {
-    let embedded = embedding.and_then(|embedding| embedding.points[vertex as usize]);
+fn share<'a>(member: usize, (body, x): Member<'a, '_>, vertex: u32, share: f64) -> Share<'a> {
+    let embedded = body.lattice.as_deref().and_then(|embedding| embedding.points[vertex as usize].as_ref());
     let place = embedded.map_or_else(|| Place::Fixed(x[vertex as usize].as_dvec3()), Place::Embedded);
     Share { member, share, place }
 }
 
 /// The body of a member, and where its vertices are.
-pub(super) type Member<'a> = (&'a Body, &'a [glam::Vec3A]);
+pub(super) type Member<'a, 'x> = (&'a Body, &'x [Vec3A]);
 
 /// Appends the contacts of a body with tools, supports and grasps.
-pub(super) fn push_contacts(member: usize, (body, x): Member<'_>, contacts: &[Contact], terms: &mut Vec<Term>) {
-    let embedding = body.lattice.as_deref();
+pub(super) fn push_contacts<'a>(member: usize, body: Member<'a, '_>, contacts: &[Contact], terms: &mut Vec<Term<'a>>) {
     for contact in contacts {
         let mut shares = [None; 4];
         for (to, (vertex, weight)) in shares.iter_mut().zip(contact.site.shares()) {
-            *to = Some(share(member, embedding, x, vertex, f64::from(weight)));
+            *to = Some(share(member, body, vertex, f64::from(weight)));
         }
         terms.push(Term::contact(contact, shares, DVec3::ZERO));
     }
 }
 
 /// Appends the contacts between the bodies of an island.
-pub(super) fn push_pairs<'a>(members: impl Fn(usize) -> Member<'a>, pairs: &Pairs, terms: &mut Vec<Term>) {
+pub(super) fn push_pairs<'a, 'x>(members: impl Fn(usize) -> Member<'a, 'x>, pairs: &Pairs, terms: &mut Vec<Term<'a>>) {
     for pair in pairs.list() {
         let shares = pair.shares().map(|(member, vertex, weight)| {
-            let (body, x) = members(member);
-            (weight != 0.0).then(|| share(member, body.lattice.as_deref(), x, vertex, f64::from(weight)))
+            (weight != 0.0).then(|| share(member, members(member), vertex, f64::from(weight)))
         });
         terms.push(Term::contact(&pair.contact, shares, pair.shift().as_dvec3()));
     }

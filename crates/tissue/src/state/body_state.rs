@@ -28,6 +28,10 @@ pub(crate) struct BodyState {
     /// Nodes of the body's lattice, relative to the body's origin, which vertices follow; None
     /// without a lattice.
     pub lattice: Option<LatticeState>,
+    /// Whether the vertices are where the lattice has them, bit by bit: nothing moved them from
+    /// outside since it wrote them. Where it is not known to be so, the next frame finds out, with
+    /// the same bits if it was.
+    pub follows: bool,
 }
 
 /// The solvers' warm start: data that they keep from frame to frame.
@@ -66,6 +70,18 @@ impl BodyState {
             disturbed: false,
             warm: WarmStart { falling: vec![0.0; body.len()], supported: vec![false; body.len()] },
             lattice: body.lattice.as_ref().map(|lattice| lattice.at_rest()),
+            follows: false,
+        }
+    }
+
+    /// Makes the lattice follow vertices that were moved from outside, and the others follow it.
+    pub fn join_lattice(&mut self, body: &Body) {
+        if self.follows {
+            return;
+        }
+        if let (Some(embedding), Some(lattice)) = (&body.lattice, &mut self.lattice) {
+            embedding.follow(lattice, &mut self.x, &mut self.v);
+            self.follows = true;
         }
     }
 
@@ -86,7 +102,7 @@ impl BodyState {
     /// Copies another state of the same body without allocating. Destructuring names every field:
     /// a new one that is not copied does not compile.
     pub fn copy_from(&mut self, other: &Self) {
-        let Self { x, v, anchors, feature_anchors, stretches, disturbed, warm, lattice } = other;
+        let Self { x, v, anchors, feature_anchors, stretches, disturbed, warm, lattice, follows } = other;
         let WarmStart { falling, supported } = warm;
         self.x.copy_from_slice(x);
         self.v.copy_from_slice(v);
@@ -97,12 +113,14 @@ impl BodyState {
         self.warm.falling.copy_from_slice(falling);
         self.warm.supported.copy_from_slice(supported);
         self.lattice.clone_from(lattice);
+        self.follows = *follows;
     }
 
     /// Hashes every bit. Destructuring names every field: a new one that is not hashed does not
     /// compile.
     pub fn hash(&self, hash: &mut Xxh3) {
-        let Self { x, v, anchors, feature_anchors, stretches, disturbed, warm, lattice } = self;
+        // Whether vertices follow changes no bit of what comes.
+        let Self { x, v, anchors, feature_anchors, stretches, disturbed, warm, lattice, follows: _ } = self;
         let WarmStart { falling, supported } = warm;
         // The vertices of a collision surface follow from the nodes.
         let nodes = falling.len();

@@ -109,6 +109,7 @@ impl State {
             to.x.copy_from_slice(&from.x);
             to.v.copy_from_slice(&from.v);
             to.lattice.clone_from(&from.lattice);
+            to.follows = from.follows;
             to.anchors.clear();
             to.feature_anchors.clear();
             to.anchors.extend(from.anchors.iter().filter(|anchor| matches!(anchor.source, Source::Support(_))));
@@ -128,11 +129,13 @@ impl State {
         let b = &model.bodies[body];
         self.bodies[body].x[b.internal[node] as usize] = (position - b.origin).as_vec3a();
         self.bodies[body].disturbed = true;
+        self.bodies[body].follows = false;
     }
 
     /// Sets the velocity of a node (m/s); a pinned or held node keeps none.
     pub fn set_velocity(&mut self, model: &Model, body: usize, node: usize, velocity: DVec3) {
         self.bodies[body].v[model.bodies[body].internal[node] as usize] = velocity.as_vec3a();
+        self.bodies[body].follows = false;
     }
 
     /// Kinetic energy of all bodies (J).

@@ -38,6 +38,7 @@ impl BodyMotion {
 
     /// Gives the motion to a body's state, rounded to single precision.
     pub(crate) fn store(&self, body: &Body, state: &mut BodyState) {
+        state.follows = false;
         for (node, i) in body.internal.iter().enumerate() {
             let i = *i as usize;
             state.x[i] = self.positions[node].as_vec3a();

@@ -76,7 +76,7 @@ fn vectors(list: fn(&mut BodyState) -> &mut Vec<Vec3A>, vertices: usize) -> Vec<
 /// A change of each number of the body's state. Destructuring names every field: a new one that has
 /// no change here does not compile.
 fn body_changes(body: &BodyState) -> Vec<Change> {
-    let BodyState { x, v, anchors, feature_anchors, stretches, disturbed, warm, lattice } = body;
+    let BodyState { x, v, anchors, feature_anchors, stretches, disturbed, warm, lattice, follows: _ } = body;
     let WarmStart { falling, supported } = warm;
     let mut all = vectors(|body| &mut body.x, x.len());
     assert!(!*disturbed && anchors.len() == 1 && stretches.len() == 1);
