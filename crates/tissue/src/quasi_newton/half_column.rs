@@ -66,7 +66,7 @@ impl HalfColumn {
 
     /// y -= share L^-1 u, for a vector that is solved by half.
     #[inline(always)]
-    pub fn subtract<S: Simd>(&self, _simd: S, share: f32, y: &mut [f32]) {
+    pub fn subtract(&self, share: f32, y: &mut [f32]) {
         let mut at = 0;
         for range in &self.ranges {
             let numbers = &self.numbers[at..at + range.len()];

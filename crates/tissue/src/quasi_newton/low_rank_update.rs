@@ -162,7 +162,9 @@ impl LowRankUpdate {
                 let unit = std::iter::once((3 * node as usize + c, 1.0));
                 self.columns[3 * place + c].solve(simd, factor, scratch, unit);
             }
-            (0..3).for_each(|c| self.multiply(simd, 3 * place + c));
+            for c in 0..3 {
+                self.multiply(simd, 3 * place + c);
+            }
             self.places.push(place);
         }
     }
@@ -251,7 +253,7 @@ impl LowRankUpdate {
             shares[k] = shares[k] / l[k] - known;
         }
         for i in 0..n {
-            self.columns[self.column(i)].subtract(simd, self.shares[i] as f32, y);
+            self.columns[self.column(i)].subtract(self.shares[i] as f32, y);
         }
     }
 }

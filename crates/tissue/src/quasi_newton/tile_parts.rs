@@ -46,6 +46,11 @@ pub(super) struct Parts {
 }
 
 impl Parts {
+    /// A factor of so many supernodes that is not cut.
+    pub fn whole(supernodes: usize) -> Self {
+        Self { above: (0..supernodes).collect(), ..Self::default() }
+    }
+
     /// Cuts the `tree` of `supernodes`, whose rows below the diagonal are the numbers `rows`, first
     /// of three each. Numbers of the parts' supernodes then refer to the parts' vectors. `buffer`
     /// is room for the longest column of row tiles.
@@ -53,7 +58,7 @@ impl Parts {
         let tiles: usize = tree.own.iter().sum();
         let (roots, above) = if tiles < MIN_TILES { Default::default() } else { roots_of_parts(tree, tiles as f64) };
         if roots.len() < 2 {
-            return Self { above: (0..supernodes.len()).collect(), ..Self::default() };
+            return Self::whole(supernodes.len());
         }
         let numbers: Vec<Range<usize>> =
             above.iter().map(|s| supernodes[*s].first..supernodes[*s].first + supernodes[*s].width).collect();
@@ -185,8 +190,6 @@ mod tests {
             let rows = panel.rows().iter().copied();
             tiles.push(level, panel.first(), width, rows, |r, c| inverse[width * c + r], |r, c| panel.below(r, c));
         }
-        tiles.end();
-        assert!(tiles.parts() >= 2, "the factor is too small to be cut");
         let right: Vec<f32> = (0..3 * positions.len()).map(|i| ((7 * i) % 11) as f32 - 5.0).collect();
         let solve = |tiles: &mut Tiles| {
             let mut x = right.clone();
@@ -197,14 +200,20 @@ mod tests {
             });
             x
         };
+        tiles.end_whole();
+        let whole = solve(&mut tiles);
+        tiles.end();
+        assert!(tiles.parts() >= 2, "the factor is too small to be cut");
         let parts = solve(&mut tiles);
+        let most = whole.iter().fold(0.0f32, |most, x| most.max(x.abs()));
+        assert!(whole.iter().zip(&parts).all(|(a, b)| (a - b).abs() < 1e-4 * most));
         // The factor before it was packed has the nodes as the matrix numbers them.
         let numbers = |k: usize| 3 * factor.order()[k / 3] as usize + k % 3;
-        let mut whole = vec![0.0; right.len()];
-        right.iter().enumerate().for_each(|(k, x)| whole[numbers(k)] = *x);
-        factor.solve(level, &mut whole);
-        let most = whole.iter().fold(0.0f32, |most, x| most.max(x.abs()));
-        assert!(parts.iter().take(whole.len()).enumerate().all(|(k, x)| (x - whole[numbers(k)]).abs() < 1e-3 * most));
+        let mut unpacked = vec![0.0; right.len()];
+        right.iter().enumerate().for_each(|(k, x)| unpacked[numbers(k)] = *x);
+        factor.solve(level, &mut unpacked);
+        let off = |(k, x): (usize, &f32)| (x - unpacked[numbers(k)]).abs();
+        assert!(parts[..right.len()].iter().enumerate().map(off).all(|off| off < 1e-3 * most));
         for threads in [1, 2, 3] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             assert!(pool.install(|| solve(&mut tiles)) == parts, "{threads} threads");

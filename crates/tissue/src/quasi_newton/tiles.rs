@@ -108,6 +108,12 @@ impl Tiles {
         self.parts = Parts::cut(&self.tree, &mut self.supernodes, &mut self.rows, self.buffer.len());
     }
 
+    /// Ends the factor without cutting it.
+    #[cfg(test)]
+    pub fn end_whole(&mut self) {
+        self.parts = Parts::whole(self.supernodes.len());
+    }
+
     /// Parts that threads solve with at once; 0 if the factor is not cut.
     #[cfg(test)]
     pub fn parts(&self) -> usize {

@@ -202,8 +202,8 @@ impl QuasiNewtonSolver {
     }
 }
 
-/// A contact's force at `x`, with its stiffness with respect to the motion of what it touches. A
-/// contact that slips has none along the surface. None where no force acts.
+/// The force of a contact at `x`, and its stiffness when what it touches moves. A contact that
+/// slips has no stiffness along the surface. None where no force acts.
 fn tangent(contact: &Contact, x: Vec3A) -> Option<Push> {
     let push = contact.push(x)?;
     Some(Push { across: if contact.slide(x).is_some() { 0.0 } else { push.across }, ..push })

@@ -119,7 +119,7 @@ impl BodyState {
     /// Hashes every bit. Destructuring names every field: a new one that is not hashed does not
     /// compile.
     pub fn hash(&self, hash: &mut Xxh3) {
-        // Whether vertices follow changes no bit of what comes.
+        // `follows` saves work and changes no result.
         let Self { x, v, anchors, feature_anchors, stretches, disturbed, warm, lattice, follows: _ } = self;
         let WarmStart { falling, supported } = warm;
         // The vertices of a collision surface follow from the nodes.
