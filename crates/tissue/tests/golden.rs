@@ -126,7 +126,7 @@ fn lift_and_probe(frame: usize) -> Vec<Pose> {
 fn bodies_and_tools_that_touch() {
     let (model, state) = touching_bodies();
     let found = hashes(&model, &state, 40, &lift_and_probe, &[]);
-    check("bodies and tools that touch", found, [0xcfbe055dd7343ed1, 0x6fa9e7edf5d97b7b, 0x5fca30d71c5d9519]);
+    check("bodies and tools that touch", found, [0x19f4f0ce658196ea, 0x0d1708b41bcb6975, 0x055e40eba2d49827]);
 }
 
 /// Loads, a state with inverted elements, and one that is stretched.
@@ -145,7 +145,7 @@ fn loads_and_disturbed_states() {
     let loads = [(0, 40, DVec3::new(0.01, 0.0, 0.02)), (2, 5, DVec3::new(0.0, 1e-3, 1e-3))];
     let loads = loads.map(|(body, node, force)| Load { body, node, force });
     let found = hashes(&model, &state, 20, &lift_and_probe, &loads);
-    check("loads and disturbed states", found, [0xd2ad19937ad6b180, 0x0ceb4d397d7433e8, 0x5187257365210969]);
+    check("loads and disturbed states", found, [0x07fdeffe0cd5dc95, 0xcd360257a027b56f, 0x19e95c2450f8cd8a]);
 }
 
 /// A block that a rigid grasp crushes.
@@ -186,7 +186,7 @@ fn struck_block() {
         vec![at(DVec3::new(2e-3, 0.0, -11e-3) * t), at(DVec3::new(8e-3, 0.0, -3e-3) * t)]
     };
     let found = hashes(&model, &state, 24, &tools, &[]);
-    check("struck block", found, [0x20aabae17748c7cc, 0x1386c8e84b9284ca, 0xa13be86170b52075]);
+    check("struck block", found, [0x32bb91d35485de1d, 0x3c20022facd7e2f5, 0xc8346ceee9b40c32]);
 }
 
 /// Elements pressed almost flat, thrown inwards and hit: it overstretches.
@@ -220,5 +220,5 @@ fn fallback_to_sweeps() {
         jaws.stiffness = -30.0;
     }
     let found = hashes(&model, &state, 12, &lift_and_probe, &[]);
-    check("fallback to sweeps", found, [0x0a136ab06f45093d, 0x77f5de6435d096d2, 0x8cb879fec5adf793]);
+    check("fallback to sweeps", found, [0xbe4e5220d3a3d0fc, 0x77f5de6435d096d2, 0xb417e5e4aac10469]);
 }

@@ -49,6 +49,8 @@ pub(crate) struct Pair {
     shift: Vec3A,
     /// Stretch of friction's spring at the substep's beginning (m).
     stretch: Vec3A,
+    /// The offset then (m).
+    begin: Vec3A,
     /// Whether the vertex was outside when the pair was last examined.
     outside: bool,
     /// Whether it was near enough for the substep then.
@@ -163,6 +165,7 @@ impl Pairs {
                 free: near.free,
                 shift: (one.origin - two.origin).as_vec3a(),
                 stretch: known.map_or(Vec3A::ZERO, |k| stretches[k].by),
+                begin: Vec3A::ZERO,
                 outside: near.distance > 0.0,
                 listed: false,
             });
@@ -244,7 +247,8 @@ impl Pairs {
             pair.stretch = along.normalize_or_zero() * pair.stretch.length();
             pair.contact.normal = normal;
             pair.contact.point = pair.free * normal;
-            pair.contact.place = foot.off - (ahead - p) - pair.stretch;
+            pair.begin = pair.offset(|m, i| island.x(m, i));
+            pair.contact.place = pair.begin - pair.stretch;
             pair.limit = 0.0;
             pair.listed = true;
             self.list.push(*pair);
@@ -259,14 +263,17 @@ impl Pairs {
     }
 
     /// Ends a substep with the present states: stretches follow slipping contacts.
+    ///
+    /// They change by the motion. A stretch that is measured anew from positions in single
+    /// precision would drift where nothing moves, because the rounding is the same each time.
     pub fn end_substep(&mut self, island: &(impl Members + ?Sized)) {
         let x = |m: usize, vertex: u32| island.x(m, vertex);
         for pair in &self.list {
             let offset = pair.offset(x);
             self.candidates[pair.candidate as usize].stretch = if pair.contact.push(offset).is_some() {
                 let normal = pair.contact.normal;
-                let off = offset - pair.contact.place - pair.contact.slide(offset).unwrap_or(Vec3A::ZERO);
-                off - off.dot(normal) * normal
+                let by = offset - pair.begin - pair.contact.slide(offset).unwrap_or(Vec3A::ZERO);
+                pair.stretch + (by - by.dot(normal) * normal)
             } else {
                 Vec3A::ZERO
             };
