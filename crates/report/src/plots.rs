@@ -17,7 +17,7 @@ const MAX_VALUE: f64 = 1e300;
 
 /// A curve.
 pub struct Line {
-    /// Points (x, y).
+    /// Points (x, y). A single one is drawn as a dot.
     pub points: Vec<(f64, f64)>,
     /// Colour (sRGB).
     pub color: [u8; 3],
@@ -166,6 +166,10 @@ impl Plot<'_> {
             if line.filled {
                 let area = AreaSeries::new(points.iter().copied(), y0.max(0.0), color.mix(0.12));
                 chart.draw_series(area).map_err(|e| e.to_string())?;
+            }
+            if let [point] = points[..] {
+                chart.draw_series([Circle::new(point, 4, color.filled())]).map_err(|e| e.to_string())?;
+                continue;
             }
             let series = LineSeries::new(points.iter().copied(), color.stroke_width(2));
             chart.draw_series(series).map_err(|e| e.to_string())?;

@@ -63,8 +63,13 @@ fn plot(r: &MeshConvergenceResult, section: Section, title: &str, value: Value, 
             series.push((format!("{kind}, {nu}"), Line::new(points, colors::organ(series.len()))));
         }
     }
-    let legend = page::legend(series.iter().map(|(name, line)| (name.as_str(), line.color)));
-    let lines = series.into_iter().map(|(_, line)| line).collect();
+    let mut legend: Vec<(&str, [u8; 3])> = series.iter().map(|(name, line)| (name.as_str(), line.color)).collect();
+    let color = colors::organ(series.len());
+    legend.push(("default tissue, each ratio", color));
+    let legend = page::legend(legend);
+    let mut lines: Vec<Line> = series.into_iter().map(|(_, line)| line).collect();
+    let default = r.rows.iter().zip(&r.errors).filter(|(row, _)| row.method == "default");
+    lines.extend(default.map(|(row, e)| Line::new(vec![(row.edge_mm, 100.0 * value(e))], color)));
     let plot =
         Plot { title, x: "edge (mm)", y: "error (%)", lines, show: vec![0.0], limits: vec![0.0], ..Plot::default() };
     Ok(section.plot(&plot, &format!("<b>{title}</b>: error against the body, by kind and Poisson's ratio.{legend}"))?)
