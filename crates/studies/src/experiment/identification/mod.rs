@@ -11,10 +11,11 @@ use crate::study::{Job, Kind, Study};
 use crate::trials::Outcomes;
 use crate::{Error, Result};
 use clap::Args;
-use phantom::{Phantom, TRACKER};
-use result::{FitRow, coverage, errors};
+use phantom::Phantom;
+use result::{FitRow, NOISE_MM, coverage, errors, support_width};
 use trocar_core::Progress;
 use trocar_report::document::Document;
+use trocar_specimen::Parameter;
 
 /// Cells of the coarse mesh of the fit, by default and in a coarser variant (mm).
 const CELL_MM: f64 = 4.0;
@@ -50,6 +51,7 @@ struct Trial {
 
 impl Study for IdentificationExperiment {
     const NAME: &'static str = "identification";
+    const SCHEMA: u32 = 2;
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> = Some(
         "Output folder of phantoms, fits and report. Finished fits in it are used again: an interrupted run resumes.",
@@ -76,7 +78,7 @@ impl Study for IdentificationExperiment {
             let own = folder.join(format!("{}-{}", t.cell_mm, t.forces));
             Phantom::new(t.seed, &own, progress)?.fit(1e-3 * t.cell_mm, t.forces, progress)
         };
-        let Outcomes { rows, resumed } = job.trials("fits", "2", &trials, key, self.threads, run)?;
+        let Outcomes { rows, resumed } = job.trials("fits", "3", &trials, key, self.threads, run)?;
         let of = |cell_mm: f64, forces: bool| -> Vec<&FitRow> {
             rows.iter().filter(|r| r.cell_mm == cell_mm && r.forces == forces).collect()
         };
@@ -87,8 +89,9 @@ impl Study for IdentificationExperiment {
         let result = IdentificationResult {
             covered: coverage.iter().filter(|c| c.fit == "default" && c.coverage >= COVERED).count(),
             landmark_rmse_mm: errors.first().and_then(|e| e.held_out_mm),
-            landmark_floor_mm: 1e3 * 3f64.sqrt() * TRACKER,
+            landmark_floor_mm: NOISE_MM,
             lift_mm: trocar_core::median(lifts),
+            support_width: support_width(&coverage[..Parameter::ALL.len()]),
             nodes: [nodes(CELL_MM), nodes(COARSER_MM)],
             coverage,
             errors,

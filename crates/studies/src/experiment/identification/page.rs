@@ -48,6 +48,13 @@ fn cards(r: &IdentificationResult) -> Vec<Card> {
             "parameters whose 90% interval holds 80% or more of truths",
         )
         .met(r.covered == 6),
+        Card::new(
+            "Support",
+            or_dash(r.support_width, 2),
+            "widest interval of a parameter of the support over its prior's, in phantoms whose fitted lifts can tell \
+             it; 0.5 at most",
+        )
+        .met(r.support_width.is_some_and(|width| width <= 0.5)),
         Card::new("Landmark error", mm(r.landmark_rmse_mm), note).met(met),
     ]
 }
@@ -66,6 +73,8 @@ fn coverage(rows: &[CoverageRow]) -> Table {
             ("Truth in the 90% interval", &|c| format!("{} of {}", c.holds, c.phantoms)),
             ("Width over the prior's", &|c| fixed(c.width, 2)),
             ("At most half", &|c| format!("{} of {}", c.identified, c.phantoms)),
+            ("Told in", &|c| format!("{} of {}", c.told, c.phantoms)),
+            ("Width there", &|c| or_dash(c.told_width, 2)),
         ],
     )
 }

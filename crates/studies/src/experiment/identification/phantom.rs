@@ -7,7 +7,9 @@ use std::path::Path;
 use trocar_core::{Progress, Random};
 use trocar_geometry::io::{Unit, read_surface};
 use trocar_geometry::{LatticeMesher, MeshDistance};
-use trocar_identify::{FINER, Grip, Identification, Landmark, LoneOrgan, Observation, Pace, Pull, default_priors};
+use trocar_identify::{
+    FINER, Grip, Identification, Landmark, Lifted, LoneOrgan, Observation, Pace, Pull, default_priors,
+};
 use trocar_phantom::RecordOptions;
 use trocar_specimen::{
     End, Material, MaterialModel, NINETY, Organ, OrganFacts, Parameter, Pins, Posterior, Provenance, Specimen,
@@ -19,8 +21,13 @@ const ORGAN: &str = "appendix";
 /// Cells of the true tissue (m).
 const TRUE_CELL: f64 = 2.5e-3;
 
-/// Lifts of a phantom; the even ones are fitted, the odd ones judged.
+/// Lifts of a phantom.
 pub(super) const LIFTS: usize = 6;
+
+/// The even lifts are fitted, the odd ones judged.
+fn is_fitted(lift: usize) -> bool {
+    lift.is_multiple_of(2)
+}
 
 /// Organ coordinates of the grasps, and their ways (m), as of filmed lifts.
 const GRASPS: [f64; 2] = [0.56, 0.78];
@@ -55,6 +62,9 @@ pub(super) struct Phantom {
     organ: LoneOrgan,
     truth: Vec<(Parameter, f64)>,
     lifts: Vec<Observation>,
+    /// How far the threads move the landmarks of the fitted lifts (m, RMS), if these lifts can be
+    /// simulated without them.
+    threads_move: Option<f64>,
 }
 
 impl Phantom {
@@ -78,8 +88,21 @@ impl Phantom {
             let lifted: Option<Vec<_>> = held.lift(&ways, Pace::QUICK, progress)?.into_iter().collect();
             if let Some(lifted) = lifted {
                 let seen = |(number, (pull, lifted))| observed(&held, number, pull, lifted, random.stream(3));
-                let lifts = ways.iter().zip(&lifted).enumerate().map(seen).collect();
-                return Ok(Self { seed, organ, truth, lifts });
+                let lifts: Vec<Observation> = ways.iter().zip(&lifted).enumerate().map(seen).collect();
+                let fitted: Vec<usize> = (0..LIFTS).filter(|k| is_fitted(*k)).collect();
+                let loose = held.with(|organ| organ.threads = None);
+                let pulls: Vec<Pull> = fitted.iter().map(|k| ways[*k]).collect();
+                let without: Option<Vec<_>> = loose.lift(&pulls, Pace::QUICK, progress)?.into_iter().collect();
+                let threads_move = without.map(|without| {
+                    let moved = |(k, without): (&usize, &Lifted)| {
+                        let places = || lifts[*k].landmarks.iter().map(|l| l.rest).collect();
+                        let (with, without) = (held.motions(&lifted[*k], places()), loose.motions(without, places()));
+                        with.iter().zip(&without).map(|(a, b)| a.distance_squared(*b)).collect::<Vec<_>>()
+                    };
+                    let squares: Vec<f64> = fitted.iter().zip(&without).flat_map(moved).collect();
+                    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+                });
+                return Ok(Self { seed, organ, truth, lifts, threads_move });
             }
         }
         Err(Error::Mismatch(format!("phantom {seed}: none of {DRAWS} draws of its tissue can be lifted")))
@@ -94,7 +117,7 @@ impl Phantom {
         if !forces {
             lifts.iter_mut().for_each(|lift| lift.force = None);
         }
-        let (fitted, judged): (Vec<_>, Vec<_>) = lifts.into_iter().partition(|lift| lift.number % 2 == 0);
+        let (fitted, judged): (Vec<_>, Vec<_>) = lifts.into_iter().partition(|lift| is_fitted(lift.number));
         let priors = default_priors();
         let recording = format!("phantom {}", self.seed);
         let identification = Identification {
@@ -146,6 +169,7 @@ impl Phantom {
                 (organ.pins, organ.threads) = (OWN_PINS, None);
                 organ.material.young_modulus_pa = OWN_MODULUS;
             })?,
+            threads_move_mm: self.threads_move.map(|moved| 1e3 * moved),
             lift_mm: trocar_core::median(judged.iter().map(|l| 1e3 * l.pull.displacement.length()).collect::<Vec<_>>()),
         })
     }
@@ -203,13 +227,7 @@ fn ways(organ: &LoneOrgan, random: Random) -> Vec<Pull> {
 }
 
 /// A true lift as it is measured.
-fn observed(
-    organ: &LoneOrgan,
-    number: usize,
-    pull: &Pull,
-    lifted: &trocar_identify::Lifted,
-    random: Random,
-) -> Observation {
+fn observed(organ: &LoneOrgan, number: usize, pull: &Pull, lifted: &Lifted, random: Random) -> Observation {
     let random = random.stream(number as u64);
     let noise = |stream: u64, deviation: f64| {
         let own = random.stream(stream);

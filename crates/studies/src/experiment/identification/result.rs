@@ -4,6 +4,13 @@ use crate::trials::Resumed;
 use serde::{Deserialize, Serialize};
 use trocar_specimen::Parameter;
 
+/// What the tracker's noise moves a landmark by (mm, RMS).
+pub(super) const NOISE_MM: f64 = 1e3 * super::phantom::TRACKER * 1.732_050_807_568_877_2;
+
+/// The parameters of what holds the organ.
+const SUPPORT: [Parameter; 4] =
+    [Parameter::BaseLength, Parameter::ThreadsFrom, Parameter::ThreadsSlack, Parameter::ThreadsStiffness];
+
 /// One parameter of one fit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ParameterRow {
@@ -46,6 +53,19 @@ pub struct FitRow {
     pub own_pins_mm: Option<f64>,
     /// Median displacement of these lifts (mm).
     pub lift_mm: Option<f64>,
+    /// How far the true threads move the landmarks of the fitted lifts (mm, RMS): true lifts beside
+    /// the same ones without threads.
+    pub threads_move_mm: Option<f64>,
+}
+
+impl FitRow {
+    /// Whether the fitted lifts can tell a parameter: those of threads need threads that move
+    /// landmarks by more than the tracker's noise.
+    fn tells(&self, parameter: Parameter) -> bool {
+        let of_threads =
+            matches!(parameter, Parameter::ThreadsFrom | Parameter::ThreadsSlack | Parameter::ThreadsStiffness);
+        !of_threads || self.threads_move_mm.is_some_and(|moved| moved > NOISE_MM)
+    }
 }
 
 /// One parameter over all phantoms.
@@ -65,6 +85,11 @@ pub struct CoverageRow {
     pub width: f64,
     /// Phantoms of which it is at most half as wide.
     pub identified: usize,
+    /// Phantoms whose fitted lifts can tell it: for threads, those whose threads move landmarks by
+    /// more than the tracker's noise.
+    pub told: usize,
+    /// Median width over the prior's of these.
+    pub told_width: Option<f64>,
 }
 
 /// Landmark errors over all phantoms: medians (mm).
@@ -97,6 +122,9 @@ pub struct IdentificationResult {
     pub landmark_rmse_mm: Option<f64>,
     /// What noise alone gives (mm).
     pub landmark_floor_mm: f64,
+    /// The widest of the support's parameters where lifts can tell them, default fit: median width
+    /// over the prior's.
+    pub support_width: Option<f64>,
     /// Median displacement of these lifts (mm).
     pub lift_mm: Option<f64>,
     /// Nodes of the fitted meshes: medians of the default and the coarser one.
@@ -107,13 +135,23 @@ pub struct IdentificationResult {
     pub resumed: Resumed,
 }
 
+/// The median width.
+fn width(rows: &[ParameterRow]) -> Option<f64> {
+    trocar_core::median(rows.iter().map(|p| p.width).collect::<Vec<_>>())
+}
+
+/// The widest of the support's parameters where lifts can tell them.
+pub(super) fn support_width(coverage: &[CoverageRow]) -> Option<f64> {
+    let support = coverage.iter().filter(|c| SUPPORT.iter().any(|p| p.name() == c.parameter));
+    support.filter_map(|c| c.told_width).max_by(f64::total_cmp)
+}
+
 /// Each parameter over the rows of a fit.
 pub(super) fn coverage(fit: &str, rows: &[&FitRow]) -> Vec<CoverageRow> {
-    let of = |name: &str| -> Vec<ParameterRow> {
-        rows.iter().flat_map(|r| &r.parameters).filter(|p| p.parameter == name).cloned().collect()
-    };
     let row = |parameter: Parameter| {
-        let all = of(parameter.name());
+        let of = |r: &&&FitRow| r.parameters.iter().find(|p| p.parameter == parameter.name()).cloned();
+        let all: Vec<ParameterRow> = rows.iter().filter_map(|r| of(&r)).collect();
+        let told: Vec<ParameterRow> = rows.iter().filter(|r| r.tells(parameter)).filter_map(|r| of(&r)).collect();
         let holds = all.iter().filter(|p| p.holds).count();
         CoverageRow {
             fit: fit.to_owned(),
@@ -121,8 +159,10 @@ pub(super) fn coverage(fit: &str, rows: &[&FitRow]) -> Vec<CoverageRow> {
             holds,
             phantoms: all.len(),
             coverage: holds as f64 / all.len().max(1) as f64,
-            width: trocar_core::median(all.iter().map(|p| p.width).collect::<Vec<_>>()).unwrap_or(f64::NAN),
+            width: width(&all).unwrap_or(f64::NAN),
             identified: all.iter().filter(|p| p.width <= 0.5).count(),
+            told: told.len(),
+            told_width: width(&told),
         }
     };
     Parameter::ALL.into_iter().map(row).collect()
@@ -154,13 +194,15 @@ mod tests {
             cell_mm: 4.0,
             forces: false,
             nodes: 400,
-            parameters: vec![ParameterRow {
-                parameter: "base_length".into(),
-                truth: 0.1,
-                interval: [0.05, 0.1, 0.2],
-                width,
-                holds,
-            }],
+            parameters: [Parameter::BaseLength, Parameter::ThreadsSlack]
+                .map(|parameter| ParameterRow {
+                    parameter: parameter.name().to_owned(),
+                    truth: 0.1,
+                    interval: [0.05, 0.1, 0.2],
+                    width,
+                    holds,
+                })
+                .to_vec(),
             diverged: 0,
             fitted_rmse_mm: 1.0,
             model_error: 0.02,
@@ -168,11 +210,17 @@ mod tests {
             without_threads_mm: None,
             own_pins_mm: Some(5.0),
             lift_mm: Some(20.0),
+            threads_move_mm: Some(0.3 * phantom as f64),
         };
         let rows = [row(1, true, 0.2), row(2, false, 0.6), row(3, true, 0.3)];
         let all: Vec<&FitRow> = rows.iter().collect();
         let base = &coverage("default", &all)[0];
         assert_eq!((base.holds, base.phantoms, base.identified, base.width), (2, 3, 2, 0.3));
+        assert_eq!((base.told, base.told_width), (3, Some(0.3)));
+        // The first phantom's threads move landmarks by less than the noise.
+        let slack = &coverage("default", &all)[2];
+        assert_eq!((slack.phantoms, slack.told, slack.told_width), (3, 2, Some(0.45)));
+        assert_eq!(support_width(&coverage("default", &all)), Some(0.45));
         assert_eq!(errors("default", &all).held_out_mm, Some(1.5));
     }
 }
