@@ -212,15 +212,15 @@ mod tests {
             lift_mm: Some(20.0),
             threads_move_mm: Some(0.3 * phantom as f64),
         };
-        let rows = [row(1, true, 0.2), row(2, false, 0.6), row(3, true, 0.3)];
+        let rows = [row(1, true, 0.2), row(2, false, 0.7), row(3, true, 0.3)];
         let all: Vec<&FitRow> = rows.iter().collect();
         let base = &coverage("default", &all)[0];
         assert_eq!((base.holds, base.phantoms, base.identified, base.width), (2, 3, 2, 0.3));
         assert_eq!((base.told, base.told_width), (3, Some(0.3)));
         // The first phantom's threads move landmarks by less than the noise.
         let slack = &coverage("default", &all)[2];
-        assert_eq!((slack.phantoms, slack.told, slack.told_width), (3, 2, Some(0.45)));
-        assert_eq!(support_width(&coverage("default", &all)), Some(0.45));
+        assert_eq!((slack.phantoms, slack.told, slack.told_width), (3, 2, Some(0.5)));
+        assert_eq!(support_width(&coverage("default", &all)), Some(0.5));
         assert_eq!(errors("default", &all).held_out_mm, Some(1.5));
     }
 }
