@@ -229,3 +229,41 @@ impl Lifted<'_> {
         Ok((row, pictures))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trocar_core::Silent;
+
+    /// The "simulated" organ is the reconstruction moved to where the "true" one is: only its
+    /// silhouette at rest is wrong.
+    #[test]
+    fn silhouettes_follow_the_lifted_organ() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("recording");
+        let options = RecordOptions { frames: 2, ..RecordOptions::default() };
+        recorded(PHANTOM, &options, &folder, &Silent).unwrap();
+        let settings = Settings::default();
+        let made = reconstruct_recording(&folder, &settings, &dir.path().join("specimen"), &Silent).unwrap().1;
+        let recording = Recording::open(&folder).unwrap();
+
+        let beside = DVec3::new(8e-3, 0.0, 0.0);
+        let moved = |vertices: &[DVec3]| vertices.iter().map(|p| *p + beside).collect::<Vec<_>>();
+        let lifted = made.specimen.organs.iter().position(|o| o.name == ORGAN).unwrap();
+        let of = |name: &str| read_surface(&folder.join("truth").join(format!("{name}.ply")), Unit::Metre).unwrap();
+        let surfaces: Vec<TriMesh> = made.specimen.organs.iter().map(|o| of(&o.name)).collect();
+        let mut loaded = surfaces[lifted].clone();
+        loaded.vertices = moved(&loaded.vertices);
+        let rest = Scenery::new(&made, Illumination::Lamp { beside: 0.0 }).unwrap();
+        let simulated = rest.with(lifted, moved(rest.vertices(lifted)));
+        let truth = Truth { surfaces, lifted, loaded: vec![loaded] };
+        let compared = Lifted { recording: &recording, made: &made, rest: rest.clone(), truth, samples: 1 };
+        let row = |moment, scenery: &Scenery| compared.row((0, moment, 8.0), 0, scenery, dir.path()).unwrap().0;
+
+        let (still, load) = (row(Moment::Rest, &rest), row(Moment::Load, &simulated));
+        let ious = [still.lifted_iou, still.static_iou, load.lifted_iou, load.static_iou, load.wrong_camera_iou];
+        assert!(ious[0] > 0.9 && ious[1] == ious[0], "at rest: {ious:?}");
+        assert!(ious[2] > 0.9 && ious[3] < 0.7, "under load: {ious:?}");
+        assert!(ious[4] < 0.6, "the wrong camera: {ious:?}");
+    }
+}
