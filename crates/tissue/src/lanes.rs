@@ -168,6 +168,36 @@ pub(crate) fn dot_rows<S: Simd>(simd: S, a: &[Row], b: &[Row]) -> f32 {
     add_up(sum)
 }
 
+/// Sums of the products of four vectors of rows with one.
+#[inline(always)]
+pub(crate) fn dot_rows_abreast<S: Simd>(simd: S, a: &[&[Row]; 4], b: &[Row]) -> [f32; 4] {
+    let mut sums = [splat(simd, 0.0); 4];
+    let a = a.map(|a| a.as_flattened().chunks_exact(LANES));
+    let [first, second, third, fourth] = a;
+    let rows = first.zip(second).zip(third.zip(fourth)).zip(b.as_flattened().chunks_exact(LANES));
+    for (((first, second), (third, fourth)), b) in rows {
+        let b = f32x16::from_slice(simd, b);
+        for (sum, a) in sums.iter_mut().zip([first, second, third, fourth]) {
+            *sum += f32x16::from_slice(simd, a) * b;
+        }
+    }
+    sums.map(add_up)
+}
+
+/// a += k b over rows, for four k and b.
+#[inline(always)]
+pub(crate) fn add_rows_abreast<S: Simd>(simd: S, a: &mut [Row], k: [f32; 4], b: &[&[Row]; 4]) {
+    let [first, second, third, fourth] = b.map(|b| b.as_flattened().chunks_exact(LANES));
+    let rows = first.zip(second).zip(third.zip(fourth));
+    for (a, ((first, second), (third, fourth))) in a.as_flattened_mut().chunks_exact_mut(LANES).zip(rows) {
+        let mut sum = f32x16::from_slice(simd, a);
+        for (k, b) in k.into_iter().zip([first, second, third, fourth]) {
+            sum += f32x16::from_slice(simd, b) * k;
+        }
+        sum.store_slice(a);
+    }
+}
+
 /// Whether two vectors of rows are the same, number by number.
 pub(crate) fn same_rows(level: Level, a: &[Row], b: &[Row]) -> bool {
     // Chunks are compared whole, so that their numbers are compared at once.
@@ -175,15 +205,6 @@ pub(crate) fn same_rows(level: Level, a: &[Row], b: &[Row]) -> bool {
     let differ = |a: &[f32], b: &[f32]| a.iter().zip(b).fold(false, |differ, (a, b)| differ | (a != b));
     let (a, b) = (a.as_flattened(), b.as_flattened());
     a.len() == b.len() && dispatch!(level, _simd => a.chunks(CHUNK).zip(b.chunks(CHUNK)).all(|(a, b)| !differ(a, b)))
-}
-
-/// a += k b over rows.
-#[inline(always)]
-pub(crate) fn add_rows<S: Simd>(simd: S, a: &mut [Row], k: f32, b: &[Row]) {
-    let (a, b) = (a.as_flattened_mut(), b.as_flattened());
-    for (a, b) in a.chunks_exact_mut(LANES).zip(b.chunks_exact(LANES)) {
-        (f32x16::from_slice(simd, a) + f32x16::from_slice(simd, b) * k).store_slice(a);
-    }
 }
 
 /// Sum over the lanes, in a fixed order.

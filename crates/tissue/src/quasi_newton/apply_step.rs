@@ -4,10 +4,12 @@
 use super::body_system::QuasiNewtonSolver;
 use super::iterate::{InitialGuess, Iterate, position};
 use super::layout::Layout;
+use super::memory::MIN_ROWS;
 use crate::Body;
 use crate::frame::Frame;
 use crate::inversion_guard::HELD_STRETCH;
 use crate::lanes::{LANES, Row};
+use crate::threads::in_parts;
 use fearless_simd::dispatch;
 use glam::Vec3A;
 
@@ -141,13 +143,13 @@ impl QuasiNewtonSolver {
             for round in 0..=MAX_HALVINGS + MAX_DROPS {
                 let Self { level, layout, elements, iterate, .. } = self;
                 let Iterate { x, base, direction, .. } = &mut *iterate;
-                dispatch!(*level, _simd => {
-                    let ways = base.iter().zip(direction.iter());
-                    for (x, (from, by)) in x[..layout.free].iter_mut().zip(ways) {
+                in_parts(&mut x[..layout.free], MIN_ROWS, |first, x| {
+                    let ways = base[first..].iter().zip(&direction[first..]);
+                    dispatch!(*level, _simd => for (x, (from, by)) in x.iter_mut().zip(ways) {
                         for c in 0..3 {
                             x[c] = from[c] + share * by[c];
                         }
-                    }
+                    });
                 });
                 if !elements.evaluate(*level, layout, iterate, h) {
                     return true;

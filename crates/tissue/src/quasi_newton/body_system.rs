@@ -1,9 +1,9 @@
 //! The quasi-Newton solver of one body: its parts by purpose, and the potential of one body.
 
 use super::elements::Elements;
-use super::history::Memory;
 use super::iterate::{InitialGuess, Iterate, add, max_coordinate, position};
 use super::layout::Layout;
+use super::memory::Memory;
 use super::rigid_modes::RigidModes;
 use super::sleep::{RestCache, Sleep};
 use super::system::System;

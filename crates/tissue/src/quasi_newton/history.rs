@@ -1,97 +1,34 @@
-//! L-BFGS (Nocedal 1980): the last steps and the changes of the gradient along them.
+//! L-BFGS (Nocedal 1980): which of the last steps are in use.
 
-use crate::lanes::{Row, dot_rows};
-use fearless_simd::{Level, dispatch};
-
-/// A body's part of the last steps and changes.
-pub(super) struct Memory {
-    pub pairs: Vec<Pair>,
-}
-
-/// A step and the change of the gradient along it.
-pub(super) struct Pair {
-    pub step: Vec<Row>,
-    pub change: Vec<Row>,
-    /// Both are zero.
-    empty: bool,
-}
-
-/// Which pairs are in use, and the numbers that all bodies of an island share.
+/// Which pairs of steps and changes of the gradient are in use, and the numbers that all bodies of
+/// an island share.
 pub(crate) struct History {
+    /// Room for so many pairs.
+    pairs: usize,
     /// Pairs in use; the newest is that of this number.
-    pub count: usize,
-    pub newest: usize,
+    count: usize,
+    newest: usize,
     /// The preconditioner's solutions are taken times this, as in Nocedal and Wright 2006,
     /// "Numerical Optimization", equation 7.20, but learned from the line search, which needs no
     /// other solve: the matrix at rest is too soft for squeezed and pressed tissue.
     pub scale: f32,
-    /// 1 / (step . change) of each pair.
-    pub inverses: Vec<f32>,
-    /// Scratch of the two loops.
-    pub shares: Vec<f32>,
+    /// The numbers of the pairs in use, newest first.
+    pub used: Vec<usize>,
+    /// Scratch of the two loops: factors of the pairs in use.
+    pub shares: Vec<f64>,
 }
 
 /// A pair whose curvature is below this share of its lengths is not used.
-pub(super) const MIN_CURVATURE_SHARE: f32 = 1e-6;
+const MIN_CURVATURE_SHARE: f64 = 1e-6;
 
 /// Smallest scale of the preconditioner's solutions.
 const MIN_SCALE: f32 = 0.3;
 
-impl Memory {
-    /// Room for `pairs` of vectors of `rows`.
-    pub fn new(pairs: usize, rows: usize) -> Self {
-        let pair = || Pair { step: vec![[0.0; 4]; rows], change: vec![[0.0; 4]; rows], empty: true };
-        Self { pairs: (0..pairs).map(|_| pair()).collect() }
-    }
-
-    /// Records a step of `share` times `direction`, which changed the gradient from `before` to
-    /// `after`. Returns step . change, step . step and change . change.
-    pub fn record(
-        &mut self,
-        level: Level,
-        at: usize,
-        share: f32,
-        direction: &[Row],
-        [before, after]: [&[Row]; 2],
-    ) -> [f32; 3] {
-        let pair = &mut self.pairs[at];
-        pair.empty = false;
-        dispatch!(level, simd => {
-            for (to, from) in pair.step.as_flattened_mut().iter_mut().zip(direction.as_flattened()) {
-                *to = share * from;
-            }
-            let values = after.as_flattened().iter().zip(before.as_flattened());
-            for (to, (after, before)) in pair.change.as_flattened_mut().iter_mut().zip(values) {
-                *to = after - before;
-            }
-            [
-                dot_rows(simd, &pair.step, &pair.change),
-                dot_rows(simd, &pair.step, &pair.step),
-                dot_rows(simd, &pair.change, &pair.change),
-            ]
-        })
-    }
-
-    /// Forgets a step.
-    pub fn forget(&mut self, at: usize) {
-        let pair = &mut self.pairs[at];
-        if !std::mem::replace(&mut pair.empty, true) {
-            pair.step.fill([0.0; 4]);
-            pair.change.fill([0.0; 4]);
-        }
-    }
-
-    /// step . change.
-    pub fn curvature(&self, level: Level, at: usize) -> f32 {
-        let pair = &self.pairs[at];
-        dispatch!(level, simd => dot_rows(simd, &pair.step, &pair.change))
-    }
-}
-
 impl History {
     /// Room for `pairs`.
     pub fn new(pairs: usize) -> Self {
-        Self { count: 0, newest: 0, scale: 1.0, inverses: vec![0.0; pairs], shares: vec![0.0; pairs] }
+        let (used, shares) = (Vec::with_capacity(pairs), Vec::with_capacity(pairs));
+        Self { pairs, count: 0, newest: 0, scale: 1.0, used, shares }
     }
 
     /// Forgets all pairs.
@@ -110,8 +47,38 @@ impl History {
         self.scale = (self.scale * best).clamp(MIN_SCALE, 1.0);
     }
 
-    /// Number of the pair that is `age` steps older than the newest.
-    pub fn at(&self, age: usize) -> usize {
-        (self.newest + self.inverses.len() - age) % self.inverses.len()
+    /// Lists the pairs in use. They end before one whose `curvature` is not positive, as when
+    /// bodies have fallen asleep.
+    pub fn list(&mut self, curvature: impl Fn(usize) -> f64) {
+        self.used.clear();
+        for age in 0..self.count {
+            let at = (self.newest + self.pairs - age) % self.pairs;
+            let positive = curvature(at) > f64::from(f32::MIN_POSITIVE);
+            if !positive {
+                break;
+            }
+            self.used.push(at);
+        }
+        self.count = self.used.len();
+    }
+
+    /// The number of the next pair, of which the list is free from now on; None without memory.
+    pub fn next(&mut self) -> Option<usize> {
+        let next = (self.newest + 1) % self.pairs.max(1);
+        self.used.retain(|at| *at != next);
+        (self.pairs > 0).then_some(next)
+    }
+
+    /// Takes the pair `next` into use if its step and its change fit: step . change, step . step
+    /// and change . change.
+    pub fn take(&mut self, next: usize, [curvature, steps, changes]: [f64; 3]) {
+        let least = (MIN_CURVATURE_SHARE * (steps * changes).sqrt()).max(f64::from(f32::MIN_POSITIVE));
+        if curvature > least {
+            self.newest = next;
+            self.count = (self.count + 1).min(self.pairs);
+        } else {
+            // The oldest pair was written over.
+            self.count = self.count.min(self.pairs - 1);
+        }
     }
 }

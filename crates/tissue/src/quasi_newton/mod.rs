@@ -28,6 +28,7 @@ mod iterate;
 mod layout;
 mod line_search;
 mod low_rank_update;
+mod memory;
 mod minimise;
 mod resting;
 mod rigid_modes;

@@ -49,7 +49,6 @@ impl IslandSystem<'_> {
         if any {
             self.record_pushes();
             self.active().for_each(|body| body.sleep.active = !body.sleep.asleep);
-            self.recompute_curvatures();
         }
     }
 
@@ -95,9 +94,6 @@ impl IslandSystem<'_> {
         for body in self.all() {
             woken |= body.sleep.was_resting && body.sleep.active;
             body.sleep.asleep &= !body.sleep.active;
-        }
-        if woken {
-            self.recompute_curvatures();
         }
         woken
     }
