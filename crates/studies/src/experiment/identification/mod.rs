@@ -51,7 +51,6 @@ struct Trial {
 
 impl Study for IdentificationExperiment {
     const NAME: &'static str = "identification";
-    const SCHEMA: u32 = 2;
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> = Some(
         "Output folder of phantoms, fits and report. Finished fits in it are used again: an interrupted run resumes.",
