@@ -46,8 +46,8 @@ fn a_sphere_on_many_triangles_comes_to_rest() {
 }
 
 /// Tissue lies on tissue, where friction bears some of its weight. Once it is at rest it has the
-/// same bits in every frame. Friction that is rounded anew in each of them would
-/// load it until it moves, and again.
+/// same bits in every frame. Friction that is rounded anew in each of them would load it until it
+/// moves, and again.
 #[test]
 fn tissue_on_tissue_stays_at_rest() {
     let mesh = block([4, 4, 3], 4e-3);

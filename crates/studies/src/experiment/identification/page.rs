@@ -51,8 +51,8 @@ fn cards(r: &IdentificationResult) -> Vec<Card> {
         Card::new(
             "Support",
             or_dash(r.support_width, 2),
-            "widest interval of a parameter of the support over its prior's, in phantoms whose fitted lifts can tell \
-             it; 0.5 at most",
+            "widest interval of a parameter of the support over its prior's, in phantoms in which it is observable; \
+             0.5 at most",
         )
         .met(r.support_width.is_some_and(|width| width <= 0.5)),
         Card::new("Landmark error", mm(r.landmark_rmse_mm), note).met(met),
@@ -73,8 +73,8 @@ fn coverage(rows: &[CoverageRow]) -> Table {
             ("Truth in the 90% interval", &|c| format!("{} of {}", c.holds, c.phantoms)),
             ("Width over the prior's", &|c| fixed(c.width, 2)),
             ("At most half", &|c| format!("{} of {}", c.identified, c.phantoms)),
-            ("Told in", &|c| format!("{} of {}", c.told, c.phantoms)),
-            ("Width there", &|c| or_dash(c.told_width, 2)),
+            ("Observable in", &|c| format!("{} of {}", c.observable, c.phantoms)),
+            ("Width there", &|c| or_dash(c.observable_width, 2)),
         ],
     )
 }

@@ -89,19 +89,7 @@ impl Phantom {
             if let Some(lifted) = lifted {
                 let seen = |(number, (pull, lifted))| observed(&held, number, pull, lifted, random.stream(3));
                 let lifts: Vec<Observation> = ways.iter().zip(&lifted).enumerate().map(seen).collect();
-                let fitted: Vec<usize> = (0..LIFTS).filter(|k| is_fitted(*k)).collect();
-                let loose = held.with(|organ| organ.threads = None);
-                let pulls: Vec<Pull> = fitted.iter().map(|k| ways[*k]).collect();
-                let without: Option<Vec<_>> = loose.lift(&pulls, Pace::QUICK, progress)?.into_iter().collect();
-                let threads_move = without.map(|without| {
-                    let moved = |(k, without): (&usize, &Lifted)| {
-                        let places = || lifts[*k].landmarks.iter().map(|l| l.rest).collect();
-                        let (with, without) = (held.motions(&lifted[*k], places()), loose.motions(without, places()));
-                        with.iter().zip(&without).map(|(a, b)| a.distance_squared(*b)).collect::<Vec<_>>()
-                    };
-                    let squares: Vec<f64> = fitted.iter().zip(&without).flat_map(moved).collect();
-                    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
-                });
+                let threads_move = threads_move(&held, &ways, &lifted, &lifts, progress)?;
                 return Ok(Self { seed, organ, truth, lifts, threads_move });
             }
         }
@@ -173,6 +161,28 @@ impl Phantom {
             lift_mm: trocar_core::median(judged.iter().map(|l| 1e3 * l.pull.displacement.length()).collect::<Vec<_>>()),
         })
     }
+}
+
+/// How far the threads of `held` move the landmarks of the fitted lifts (m, RMS): the true lifts
+/// beside the same ones without threads. None if these cannot be simulated.
+fn threads_move(
+    held: &LoneOrgan,
+    ways: &[Pull],
+    lifted: &[Lifted],
+    lifts: &[Observation],
+    progress: &dyn Progress,
+) -> Result<Option<f64>> {
+    let loose = held.with(|organ| organ.threads = None);
+    let fitted: Vec<usize> = (0..LIFTS).filter(|k| is_fitted(*k)).collect();
+    let ways: Vec<Pull> = fitted.iter().map(|k| ways[*k]).collect();
+    let mut squares = Vec::new();
+    for (k, without) in fitted.into_iter().zip(loose.lift(&ways, Pace::QUICK, progress)?) {
+        let Some(without) = without else { return Ok(None) };
+        let places: Vec<DVec3> = lifts[k].landmarks.iter().map(|landmark| landmark.rest).collect();
+        let (with, without) = (held.motions(&lifted[k], places.clone()), loose.motions(&without, places));
+        squares.extend(with.iter().zip(&without).map(|(a, b)| a.distance_squared(*b)));
+    }
+    Ok((!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()))
 }
 
 /// The appendix of phantom A with the true mesh.

@@ -7,9 +7,8 @@ use trocar_specimen::Parameter;
 /// What the tracker's noise moves a landmark by (mm, RMS).
 pub(super) const NOISE_MM: f64 = 1e3 * super::phantom::TRACKER * 1.732_050_807_568_877_2;
 
-/// The parameters of what holds the organ.
-const SUPPORT: [Parameter; 4] =
-    [Parameter::BaseLength, Parameter::ThreadsFrom, Parameter::ThreadsSlack, Parameter::ThreadsStiffness];
+/// The parameters of the threads.
+const THREADS: [Parameter; 3] = [Parameter::ThreadsFrom, Parameter::ThreadsSlack, Parameter::ThreadsStiffness];
 
 /// One parameter of one fit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -59,12 +58,10 @@ pub struct FitRow {
 }
 
 impl FitRow {
-    /// Whether the fitted lifts can tell a parameter: those of threads need threads that move
-    /// landmarks by more than the tracker's noise.
-    fn tells(&self, parameter: Parameter) -> bool {
-        let of_threads =
-            matches!(parameter, Parameter::ThreadsFrom | Parameter::ThreadsSlack | Parameter::ThreadsStiffness);
-        !of_threads || self.threads_move_mm.is_some_and(|moved| moved > NOISE_MM)
+    /// Whether the fitted lifts depend on a parameter: on those of threads if these move landmarks
+    /// by more than the tracker's noise.
+    fn observes(&self, parameter: Parameter) -> bool {
+        !THREADS.contains(&parameter) || self.threads_move_mm.is_some_and(|moved| moved > NOISE_MM)
     }
 }
 
@@ -85,11 +82,11 @@ pub struct CoverageRow {
     pub width: f64,
     /// Phantoms of which it is at most half as wide.
     pub identified: usize,
-    /// Phantoms whose fitted lifts can tell it: for threads, those whose threads move landmarks by
-    /// more than the tracker's noise.
-    pub told: usize,
-    /// Median width over the prior's of these.
-    pub told_width: Option<f64>,
+    /// Phantoms in which it is observable: for threads, those whose threads move landmarks of the
+    /// fitted lifts by more than the tracker's noise.
+    pub observable: usize,
+    /// Median width over the prior's in these.
+    pub observable_width: Option<f64>,
 }
 
 /// Landmark errors over all phantoms: medians (mm).
@@ -122,8 +119,7 @@ pub struct IdentificationResult {
     pub landmark_rmse_mm: Option<f64>,
     /// What noise alone gives (mm).
     pub landmark_floor_mm: f64,
-    /// The widest of the support's parameters where lifts can tell them, default fit: median width
-    /// over the prior's.
+    /// The largest `observable_width` of the parameters of the support, default fit.
     pub support_width: Option<f64>,
     /// Median displacement of these lifts (mm).
     pub lift_mm: Option<f64>,
@@ -140,10 +136,13 @@ fn width(rows: &[ParameterRow]) -> Option<f64> {
     trocar_core::median(rows.iter().map(|p| p.width).collect::<Vec<_>>())
 }
 
-/// The widest of the support's parameters where lifts can tell them.
+/// The largest width of the parameters of the support, over phantoms in which they are observable.
 pub(super) fn support_width(coverage: &[CoverageRow]) -> Option<f64> {
-    let support = coverage.iter().filter(|c| SUPPORT.iter().any(|p| p.name() == c.parameter));
-    support.filter_map(|c| c.told_width).max_by(f64::total_cmp)
+    let is_support = |c: &&CoverageRow| {
+        let mut support = THREADS.iter().chain(&[Parameter::BaseLength]);
+        support.any(|p| p.name() == c.parameter)
+    };
+    coverage.iter().filter(is_support).filter_map(|c| c.observable_width).max_by(f64::total_cmp)
 }
 
 /// Each parameter over the rows of a fit.
@@ -151,7 +150,8 @@ pub(super) fn coverage(fit: &str, rows: &[&FitRow]) -> Vec<CoverageRow> {
     let row = |parameter: Parameter| {
         let of = |r: &&&FitRow| r.parameters.iter().find(|p| p.parameter == parameter.name()).cloned();
         let all: Vec<ParameterRow> = rows.iter().filter_map(|r| of(&r)).collect();
-        let told: Vec<ParameterRow> = rows.iter().filter(|r| r.tells(parameter)).filter_map(|r| of(&r)).collect();
+        let observed: Vec<ParameterRow> =
+            rows.iter().filter(|r| r.observes(parameter)).filter_map(|r| of(&r)).collect();
         let holds = all.iter().filter(|p| p.holds).count();
         CoverageRow {
             fit: fit.to_owned(),
@@ -161,8 +161,8 @@ pub(super) fn coverage(fit: &str, rows: &[&FitRow]) -> Vec<CoverageRow> {
             coverage: holds as f64 / all.len().max(1) as f64,
             width: width(&all).unwrap_or(f64::NAN),
             identified: all.iter().filter(|p| p.width <= 0.5).count(),
-            told: told.len(),
-            told_width: width(&told),
+            observable: observed.len(),
+            observable_width: width(&observed),
         }
     };
     Parameter::ALL.into_iter().map(row).collect()
@@ -216,10 +216,10 @@ mod tests {
         let all: Vec<&FitRow> = rows.iter().collect();
         let base = &coverage("default", &all)[0];
         assert_eq!((base.holds, base.phantoms, base.identified, base.width), (2, 3, 2, 0.3));
-        assert_eq!((base.told, base.told_width), (3, Some(0.3)));
+        assert_eq!((base.observable, base.observable_width), (3, Some(0.3)));
         // The first phantom's threads move landmarks by less than the noise.
         let slack = &coverage("default", &all)[2];
-        assert_eq!((slack.phantoms, slack.told, slack.told_width), (3, 2, Some(0.5)));
+        assert_eq!((slack.phantoms, slack.observable, slack.observable_width), (3, 2, Some(0.5)));
         assert_eq!(support_width(&coverage("default", &all)), Some(0.5));
         assert_eq!(errors("default", &all).held_out_mm, Some(1.5));
     }
