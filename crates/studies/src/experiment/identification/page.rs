@@ -18,7 +18,7 @@ pub(super) fn document(r: &IdentificationResult, phantoms: usize) -> Result<Docu
     let lead = format!(
         "{phantoms} appendices of phantom A, each with a support and tissue drawn from the prior, are lifted six times \
          by our own solver: a finer mesh, another law (corotated), noise of the tracker, of the grasp's place and of \
-         its way. From three lifts the values are identified; the other three are predicted."
+         its way. From five lifts the values are identified; the other five are predicted."
     );
     let mut section = Section::new("Identification", lead).cards(cards(r)).table(coverage(&r.coverage));
     section = section.table(errors(&r.errors)).lines(resumed(&r.resumed, "fits"));

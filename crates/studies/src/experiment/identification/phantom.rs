@@ -21,8 +21,8 @@ const ORGAN: &str = "appendix";
 /// Cells of the true tissue (m).
 const TRUE_CELL: f64 = 2.5e-3;
 
-/// Lifts of a phantom.
-pub(super) const LIFTS: usize = 6;
+/// Lifts of a phantom: the paper tracks ten throughout.
+pub(super) const LIFTS: usize = 10;
 
 /// The even lifts are fitted, the odd ones judged.
 fn is_fitted(lift: usize) -> bool {
@@ -230,7 +230,7 @@ fn ways(organ: &LoneOrgan, random: Random) -> Vec<Pull> {
         let lean = |at: u64| LEAN * random.symmetric(at + k as u64);
         let direction = up + lean(200) * level + lean(300) * up.cross(level);
         // Places rise, ways jump: low and high ones are among the fitted and among the judged.
-        let way = within(WAYS, (2 * k + 3 * (k / 3)) % LIFTS, 100 + k as u64);
+        let way = within(WAYS, 3 * k % LIFTS, 100 + k as u64);
         Pull { s: within(GRASPS, k, k as u64), displacement: way * direction.normalize(), grip: Grip::Place }
     };
     (0..LIFTS).map(pull).collect()
