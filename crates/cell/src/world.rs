@@ -178,6 +178,24 @@ impl World {
         Ok(Self { model, state, axes, toughness, up, stepper, cuts: 0 })
     }
 
+    /// A world of its own in the same state. Its bodies are shared, so that it costs little beside
+    /// building and settling another.
+    ///
+    /// # Errors
+    /// Threads that the system refuses.
+    pub fn try_clone(&self) -> Result<Self> {
+        let Self { model, state, axes, toughness, up, stepper, cuts } = self;
+        Ok(Self {
+            model: model.clone(),
+            state: state.clone(),
+            axes: axes.clone(),
+            toughness: toughness.clone(),
+            up: *up,
+            stepper: stepper.another(model)?,
+            cuts: *cuts,
+        })
+    }
+
     /// Forces of tissue on each tool in the last frame, in the order of the given motions. The list
     /// is shorter if the last tools touch nothing.
     pub fn forces(&self) -> &[ToolForce] {

@@ -133,8 +133,8 @@ impl Cells {
             // One cell uses all threads. With several cells, each uses one.
             let each = if count == 1 { threads } else { 1 };
             let seed = split.seed(0);
-            let begun = || Episode::begun(&scene, Box::new(specimens.clone()), each, seed, scene.draw(seed));
-            let episodes = built(&pool, count, begun)?;
+            let first = Episode::begun(&scene, Box::new(specimens.clone()), each, seed, scene.draw(seed));
+            let episodes = copies(first.map_err(|e| crate::error::task(&e))?, count, &pool, &specimens)?;
             let bounds = Bounds::new(episodes[0].cell(), space).map_err(|e| crate::error::task(&e))?;
             let steps = (scene.task.episode_s * f64::from(scene.rates.control_hz)).round() as usize;
             let prompt = trocar_task::prompt(&scene);
@@ -349,18 +349,15 @@ impl Cells {
     }
 }
 
-/// `count` episodes, as many at a time as the pool has threads. In between the interpreter's
-/// signals are looked at: many cells take minutes.
-fn built(
-    pool: &rayon::ThreadPool,
-    count: usize,
-    one: impl Fn() -> trocar_task::Result<Episode> + Sync,
-) -> PyResult<Vec<Episode>> {
+/// `first` and copies of it, `count` in all, as many at a time as the pool has threads. In between
+/// the interpreter's signals are looked at: thousands of cells take minutes.
+fn copies(first: Episode, count: usize, pool: &rayon::ThreadPool, specimens: &SpecimenCache) -> PyResult<Vec<Episode>> {
     let mut episodes = Vec::with_capacity(count);
+    episodes.push(first);
     while episodes.len() < count {
         let batch = pool.current_num_threads().clamp(1, count - episodes.len());
-        let more: trocar_task::Result<Vec<Episode>> =
-            pool.install(|| (0..batch).into_par_iter().map(|_| one()).collect());
+        let one = |_| episodes[0].try_clone(Box::new(specimens.clone()));
+        let more: trocar_task::Result<Vec<Episode>> = pool.install(|| (0..batch).into_par_iter().map(one).collect());
         episodes.extend(more.map_err(|e| task(&e))?);
         // Only the calling thread receives signals, not those of the pool.
         Python::attach(|py| py.check_signals())?;

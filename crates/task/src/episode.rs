@@ -54,6 +54,7 @@ struct Now {
 }
 
 /// The scene and specimen that a cell was built from, and its settled tissue.
+#[derive(Clone)]
 struct Built {
     /// See [`foundation`].
     scene: Scene,
@@ -149,6 +150,26 @@ impl Episode {
         made.check()?;
         made.reset_with(seed, made.drawn.clone())?;
         Ok(made)
+    }
+
+    /// An episode of its own in the same state, with the specimens of `supply`. It goes on with the
+    /// same bits, and costs little beside beginning another: nothing is built or settled.
+    ///
+    /// # Errors
+    /// Threads that the system refuses.
+    pub fn try_clone(&self, supply: Box<dyn SpecimenSupply>) -> Result<Self> {
+        Ok(Self {
+            scene: self.scene.clone(),
+            program: Arc::clone(&self.program),
+            supply,
+            key: self.key,
+            threads: self.threads,
+            built: self.built.clone(),
+            cell: self.cell.try_clone()?,
+            drawn: self.drawn.clone(),
+            arranged: self.arranged.clone(),
+            now: self.now.clone(),
+        })
     }
 
     fn check(&self) -> Result<()> {

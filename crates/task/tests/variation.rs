@@ -43,6 +43,25 @@ fn steps(episode: &mut Episode, seed: u64) -> Vec<u64> {
 }
 
 #[test]
+fn a_clone_goes_on_with_the_same_bits_and_alone() {
+    let scene = scene(VariationSet::Standard);
+    let mut episode = Episode::with_specimens(&scene, Box::new(Tubes), 1).unwrap();
+    steps(&mut episode, 1);
+    let mut clone = episode.try_clone(Box::new(Tubes)).unwrap();
+    assert_eq!((clone.state_hash(), clone.rows()), (episode.state_hash(), episode.rows()));
+    let on = |episode: &mut Episode| {
+        let at: Vec<Setpoint> = episode.cell().observe().iter().map(|a| a.commanded).collect();
+        episode.step(&Action::targets(&at)).unwrap();
+        episode.state_hash()
+    };
+    let before = episode.state_hash();
+    let next = on(&mut clone);
+    assert_eq!(episode.state_hash(), before, "a step of the clone moves nothing else");
+    assert_eq!(on(&mut episode), next);
+    assert_eq!(steps(&mut clone, 2), steps(&mut episode, 2), "another world than the one that was cloned");
+}
+
+#[test]
 fn a_seed_gives_the_same_bits_whatever_was_before() {
     for set in [VariationSet::Standard, VariationSet::Hard] {
         let scene = scene(set);

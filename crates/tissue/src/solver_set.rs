@@ -8,9 +8,13 @@ use crate::report::Divergence;
 use crate::state::BodyState;
 use crate::{Body, BodyContact, Model, State, StepReport};
 use glam::DVec3;
+use std::sync::Arc;
 
 /// The stages of a frame that the stepper runs, whatever the kind of the solvers.
 pub(crate) trait SolverSet: Send + Sync {
+    /// Another set of the same solvers and settings, for no body yet.
+    fn another(&self) -> Box<dyn SolverSet>;
+
     /// Changes to another model; bodies that both have in common keep their solvers.
     /// `single_thread`: the calling thread does all the work.
     fn set_model(&mut self, model: &Model, single_thread: bool);
@@ -44,7 +48,7 @@ pub(crate) trait SolverSet: Send + Sync {
 }
 
 /// Makes the solver of a body; the flag says whether the calling thread does all the work.
-type MakeSolver<S> = Box<dyn Fn(&Body, bool) -> S + Send + Sync>;
+type MakeSolver<S> = Arc<dyn Fn(&Body, bool) -> S + Send + Sync>;
 
 /// Bodies with solvers of one kind.
 pub(crate) struct BodySolvers<S: Solver> {
@@ -62,7 +66,10 @@ pub(crate) struct BodySolvers<S: Solver> {
 impl<S: Solver> BodySolvers<S> {
     /// For no body yet.
     pub fn new(make: impl Fn(&Body, bool) -> S + Send + Sync + 'static) -> Self {
-        let make = Box::new(make);
+        Self::made_by(Arc::new(make))
+    }
+
+    fn made_by(make: MakeSolver<S>) -> Self {
         Self {
             make,
             slots: Vec::new(),
@@ -74,7 +81,11 @@ impl<S: Solver> BodySolvers<S> {
     }
 }
 
-impl<S: Solver> SolverSet for BodySolvers<S> {
+impl<S: Solver + 'static> SolverSet for BodySolvers<S> {
+    fn another(&self) -> Box<dyn SolverSet> {
+        Box::new(Self::made_by(Arc::clone(&self.make)))
+    }
+
     fn set_model(&mut self, model: &Model, single_thread: bool) {
         let mut old = std::mem::take(&mut self.slots);
         for (index, body) in model.bodies.iter().enumerate() {

@@ -84,6 +84,26 @@ impl Stepper {
         Self::with_solvers(model, Box::new(solvers), false, dt, threads)
     }
 
+    /// Another stepper with the same settings, for `model`. It is as good as this one: a state gets
+    /// the same bits from both.
+    ///
+    /// # Errors
+    /// A model of another backend, and threads that the system refuses.
+    pub fn another(&self, model: &Model) -> Result<Self> {
+        let mut made = Self {
+            dt: self.dt,
+            threaded_bodies: self.threaded_bodies,
+            threads: self.threads,
+            pool: None,
+            solvers: self.solvers.another(),
+            backend: self.backend,
+            forces: Vec::new(),
+            events: Vec::new(),
+        };
+        made.set_model(model)?;
+        Ok(made)
+    }
+
     fn with_solvers(
         model: &Model,
         solvers: Box<dyn SolverSet>,

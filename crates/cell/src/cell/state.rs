@@ -3,12 +3,12 @@
 #[cfg(test)]
 mod tests;
 
-use super::Cell;
 use super::arm::ArmState;
 use super::delay::Waiting;
 use super::drive::DriveState;
 use super::rules::{Edges, OrganWatch};
 use super::solid::PinnedSurface;
+use super::{Cell, Timing};
 use crate::Result;
 use crate::world::WorldState;
 use xxhash_rust::xxh3::Xxh3;
@@ -47,6 +47,33 @@ impl CellState {
 }
 
 impl Cell {
+    /// A cell of its own in the same state. It shares what never changes, so that it costs little
+    /// beside building and settling another.
+    ///
+    /// # Errors
+    /// Threads that the system refuses.
+    pub fn try_clone(&self) -> Result<Self> {
+        Ok(Self {
+            world: self.world.try_clone()?,
+            arms: self.arms.clone(),
+            periods: self.periods,
+            control_hz: self.control_hz,
+            frames: self.frames,
+            physics_steps: self.physics_steps,
+            delay: self.delay,
+            waiting: self.waiting.clone(),
+            sever: self.sever,
+            strain_guard: self.strain_guard,
+            motions: self.motions.clone(),
+            edges: self.edges.clone(),
+            solids: self.solids.clone(),
+            contact: self.contact,
+            watches: self.watches.clone(),
+            touch: self.touch,
+            timing: Timing::default(),
+        })
+    }
+
     /// The present state.
     pub fn save(&self) -> CellState {
         // Each field is named, because a new field must be kept or left out on purpose.

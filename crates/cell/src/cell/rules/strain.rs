@@ -73,12 +73,14 @@ fn most_crushed(tets: &[[u32; 4]], rest: &[f64], now: &[DVec3]) -> (f64, DVec3) 
 
 /// Bodies at rest: their edges with squared lengths (m2), and six times the volumes of their
 /// elements (m3).
+#[derive(Clone)]
 struct Rest {
     edges: Vec<([u32; 2], f64)>,
     volumes: Vec<f64>,
 }
 
 /// The edges and volumes of all bodies at rest.
+#[derive(Clone)]
 pub(crate) struct Edges {
     bodies: Vec<Rest>,
     /// The world's number of cuts for which they are valid.

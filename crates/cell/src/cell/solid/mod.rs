@@ -28,6 +28,7 @@ pub(super) use pinned::PinnedSurface;
 pub(super) use rod::{Rod, clearance};
 
 /// The solids other than the instruments.
+#[derive(Clone)]
 pub(super) struct Solids {
     /// Height of the bed's plane (m), if there is a bed.
     pub bed: Option<f64>,

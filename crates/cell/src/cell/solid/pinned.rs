@@ -26,7 +26,7 @@ const ROOM: f64 = 0.5;
 const LEAF: usize = 4;
 
 /// The pinned triangles of all organs, in a tree of boxes.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(in crate::cell) struct PinnedSurface {
     /// In the tree's order.
     triangles: Vec<Pinned>,

@@ -16,7 +16,7 @@ const PRIOR: [u8; 3] = [190, 196, 202];
 
 pub(super) fn document(r: &IdentificationResult, phantoms: usize) -> Result<Document> {
     let lead = format!(
-        "{phantoms} appendices of phantom A, each with a support and tissue drawn from the prior, are lifted six times \
+        "{phantoms} appendices of phantom A, each with a support and tissue drawn from the prior, are lifted ten times \
          by our own solver: a finer mesh, another law (corotated), noise of the tracker, of the grasp's place and of \
          its way. From five lifts the values are identified; the other five are predicted."
     );
