@@ -18,8 +18,13 @@ use trocar_specimen::{
 /// The organ.
 const ORGAN: &str = "appendix";
 
-/// Cells of the true tissue (m).
+/// Cells of the true tissue (m), and its law.
 const TRUE_CELL: f64 = 2.5e-3;
+const TRUE_MODEL: MaterialModel = MaterialModel::Corotated;
+
+/// Change of a parameter's score that the lifts must show for it to be observable: the ends of an
+/// interval half as wide as the prior's are so far from its middle.
+const CHANGE: f64 = 0.5 * NINETY;
 
 /// Lifts of a phantom: the paper tracks ten throughout.
 pub(super) const LIFTS: usize = 10;
@@ -62,9 +67,8 @@ pub(super) struct Phantom {
     organ: LoneOrgan,
     truth: Vec<(Parameter, f64)>,
     lifts: Vec<Observation>,
-    /// How far the threads move the landmarks of the fitted lifts (m, RMS), if these lifts can be
-    /// simulated without them.
-    threads_move: Option<f64>,
+    /// By parameter, how far landmarks of the fitted lifts move with it; see [`motions`].
+    motions: Vec<Option<f64>>,
 }
 
 impl Phantom {
@@ -83,14 +87,14 @@ impl Phantom {
                 .collect();
             let held = organ.with(|organ| {
                 Posterior::apply(&truth, organ);
-                organ.material.model = MaterialModel::Corotated;
+                organ.material.model = TRUE_MODEL;
             });
             let lifted: Option<Vec<_>> = held.lift(&ways, Pace::QUICK, progress)?.into_iter().collect();
             if let Some(lifted) = lifted {
                 let seen = |(number, (pull, lifted))| observed(&held, number, pull, lifted, random.stream(3));
                 let lifts: Vec<Observation> = ways.iter().zip(&lifted).enumerate().map(seen).collect();
-                let threads_move = threads_move(&held, &ways, &lifted, &lifts, progress)?;
-                return Ok(Self { seed, organ, truth, lifts, threads_move });
+                let motions = motions(&held, &truth, &ways, &lifted, &lifts, progress)?;
+                return Ok(Self { seed, organ, truth, lifts, motions });
             }
         }
         Err(Error::Mismatch(format!("phantom {seed}: none of {DRAWS} draws of its tissue can be lifted")))
@@ -128,6 +132,7 @@ impl Phantom {
                 interval: told.interval,
                 width: told.width,
                 holds: (score - mean).abs() <= NINETY * deviation,
+                moves_mm: self.motions[k].map(|moved| 1e3 * moved),
             }
         });
         let parameters = parameters.collect();
@@ -157,32 +162,43 @@ impl Phantom {
                 (organ.pins, organ.threads) = (OWN_PINS, None);
                 organ.material.young_modulus_pa = OWN_MODULUS;
             })?,
-            threads_move_mm: self.threads_move.map(|moved| 1e3 * moved),
             lift_mm: trocar_core::median(judged.iter().map(|l| 1e3 * l.pull.displacement.length()).collect::<Vec<_>>()),
         })
     }
 }
 
-/// How far the threads of `held` move the landmarks of the fitted lifts (m, RMS): the true lifts
-/// beside the same ones without threads. None if these cannot be simulated.
-fn threads_move(
+/// By parameter, how far the landmarks of the fitted lifts move (m, RMS) if its true value changes
+/// by [`CHANGE`], up or down, whichever moves them less. A change that cannot be simulated counts
+/// for nothing; None if neither can.
+fn motions(
     held: &LoneOrgan,
+    truth: &[(Parameter, f64)],
     ways: &[Pull],
     lifted: &[Lifted],
     lifts: &[Observation],
     progress: &dyn Progress,
-) -> Result<Option<f64>> {
-    let loose = held.with(|organ| organ.threads = None);
+) -> Result<Vec<Option<f64>>> {
     let fitted: Vec<usize> = (0..LIFTS).filter(|k| is_fitted(*k)).collect();
     let ways: Vec<Pull> = fitted.iter().map(|k| ways[*k]).collect();
-    let mut squares = Vec::new();
-    for (k, without) in fitted.into_iter().zip(loose.lift(&ways, Pace::QUICK, progress)?) {
-        let Some(without) = without else { return Ok(None) };
-        let places: Vec<DVec3> = lifts[k].landmarks.iter().map(|landmark| landmark.rest).collect();
-        let (with, without) = (held.motions(&lifted[k], places.clone()), loose.motions(&without, places));
-        squares.extend(with.iter().zip(&without).map(|(a, b)| a.distance_squared(*b)));
-    }
-    Ok((!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()))
+    let moved = |k: usize, change: f64| -> Result<Option<f64>> {
+        let prior = &default_priors()[k];
+        let mut values = truth.to_vec();
+        values[k].1 = prior.name.value(prior.range, prior.name.score(prior.range, truth[k].1) + change);
+        let other = held.with(|organ| Posterior::apply(&values, organ));
+        let mut squares = Vec::new();
+        for (lift, there) in fitted.iter().zip(other.lift(&ways, Pace::QUICK, progress)?) {
+            let Some(there) = there else { return Ok(None) };
+            let places: Vec<DVec3> = lifts[*lift].landmarks.iter().map(|landmark| landmark.rest).collect();
+            let (here, there) = (held.motions(&lifted[*lift], places.clone()), other.motions(&there, places));
+            squares.extend(here.iter().zip(&there).map(|(a, b)| a.distance_squared(*b)));
+        }
+        Ok((!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()))
+    };
+    let least = |k: usize| {
+        let both = [moved(k, -CHANGE)?, moved(k, CHANGE)?];
+        Ok(both.into_iter().flatten().min_by(f64::total_cmp))
+    };
+    (0..truth.len()).map(least).collect()
 }
 
 /// The appendix of phantom A with the true mesh.

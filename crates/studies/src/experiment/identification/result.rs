@@ -7,8 +7,9 @@ use trocar_specimen::Parameter;
 /// What the tracker's noise moves a landmark by (mm, RMS).
 pub(super) const NOISE_MM: f64 = 1e3 * super::phantom::TRACKER * 1.732_050_807_568_877_2;
 
-/// The parameters of the threads.
-const THREADS: [Parameter; 3] = [Parameter::ThreadsFrom, Parameter::ThreadsSlack, Parameter::ThreadsStiffness];
+/// The parameters of the support.
+const SUPPORT: [Parameter; 4] =
+    [Parameter::BaseLength, Parameter::ThreadsFrom, Parameter::ThreadsSlack, Parameter::ThreadsStiffness];
 
 /// One parameter of one fit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,6 +24,9 @@ pub struct ParameterRow {
     pub width: f64,
     /// Whether the 90% interval holds the truth.
     pub holds: bool,
+    /// How far landmarks of the fitted lifts move (mm, RMS) if the true value changes by half of the
+    /// prior's interval, from the middle to either end, whichever moves them less.
+    pub moves_mm: Option<f64>,
 }
 
 /// One fit of one phantom.
@@ -52,16 +56,14 @@ pub struct FitRow {
     pub own_pins_mm: Option<f64>,
     /// Median displacement of these lifts (mm).
     pub lift_mm: Option<f64>,
-    /// How far the true threads move the landmarks of the fitted lifts (mm, RMS): true lifts beside
-    /// the same ones without threads.
-    pub threads_move_mm: Option<f64>,
 }
 
 impl FitRow {
-    /// Whether the fitted lifts depend on a parameter: on those of threads if these move landmarks
-    /// by more than the tracker's noise.
+    /// Whether the fitted lifts tell a parameter: its change moves their landmarks by more than the
+    /// tracker's noise.
     fn observes(&self, parameter: Parameter) -> bool {
-        !THREADS.contains(&parameter) || self.threads_move_mm.is_some_and(|moved| moved > NOISE_MM)
+        let own = self.parameters.iter().find(|p| p.parameter == parameter.name());
+        own.and_then(|p| p.moves_mm).is_some_and(|moved| moved > NOISE_MM)
     }
 }
 
@@ -82,8 +84,8 @@ pub struct CoverageRow {
     pub width: f64,
     /// Phantoms of which it is at most half as wide.
     pub identified: usize,
-    /// Phantoms in which it is observable: for threads, those whose threads move landmarks of the
-    /// fitted lifts by more than the tracker's noise.
+    /// Phantoms in which it is observable: its change by half of the prior's interval, from the
+    /// middle to either end, moves landmarks of the fitted lifts by more than the tracker's noise.
     pub observable: usize,
     /// Median width over the prior's in these.
     pub observable_width: Option<f64>,
@@ -138,10 +140,7 @@ fn width(rows: &[ParameterRow]) -> Option<f64> {
 
 /// The largest width of the parameters of the support, over phantoms in which they are observable.
 pub(super) fn support_width(coverage: &[CoverageRow]) -> Option<f64> {
-    let is_support = |c: &&CoverageRow| {
-        let mut support = THREADS.iter().chain(&[Parameter::BaseLength]);
-        support.any(|p| p.name() == c.parameter)
-    };
+    let is_support = |c: &&CoverageRow| SUPPORT.iter().any(|p| p.name() == c.parameter);
     coverage.iter().filter(is_support).filter_map(|c| c.observable_width).max_by(f64::total_cmp)
 }
 
@@ -201,6 +200,7 @@ mod tests {
                     interval: [0.05, 0.1, 0.2],
                     width,
                     holds,
+                    moves_mm: Some(if parameter == Parameter::BaseLength { 2.0 } else { 0.3 * phantom as f64 }),
                 })
                 .to_vec(),
             diverged: 0,
@@ -210,14 +210,13 @@ mod tests {
             without_threads_mm: None,
             own_pins_mm: Some(5.0),
             lift_mm: Some(20.0),
-            threads_move_mm: Some(0.3 * phantom as f64),
         };
         let rows = [row(1, true, 0.2), row(2, false, 0.7), row(3, true, 0.3)];
         let all: Vec<&FitRow> = rows.iter().collect();
         let base = &coverage("default", &all)[0];
         assert_eq!((base.holds, base.phantoms, base.identified, base.width), (2, 3, 2, 0.3));
         assert_eq!((base.observable, base.observable_width), (3, Some(0.3)));
-        // The first phantom's threads move landmarks by less than the noise.
+        // The first phantom's slack moves landmarks by less than the noise.
         let slack = &coverage("default", &all)[2];
         assert_eq!((slack.phantoms, slack.observable, slack.observable_width), (3, 2, Some(0.5)));
         assert_eq!(support_width(&coverage("default", &all)), Some(0.5));
