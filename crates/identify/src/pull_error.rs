@@ -23,8 +23,11 @@ const PLACE: f64 = 1e-3;
 const MOTION_STEP: f64 = 1e-3;
 const PLACE_STEP: f64 = 2e-3;
 
+/// Errors of a pull: of its place along the organ, and of its motion along each axis.
+pub(crate) const PULL_ERRORS: usize = 4;
+
 /// How the numbers of all lifts change with one deviation of the place and of each axis of the
-/// motion of each pull: four rows a lift. None if a lift diverges.
+/// motion of each pull: [`PULL_ERRORS`] rows a lift. None if a lift diverges.
 pub(crate) fn pull_errors(
     organ: &LoneOrgan,
     lifts: &[Observation],

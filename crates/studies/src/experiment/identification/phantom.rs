@@ -8,7 +8,7 @@ use trocar_core::{Progress, Random};
 use trocar_geometry::io::{Unit, read_surface};
 use trocar_geometry::{LatticeMesher, MeshDistance};
 use trocar_identify::{
-    FINER, Grip, Identification, Landmark, Lifted, LoneOrgan, Observation, Pace, Pull, default_priors,
+    FINER, Grip, Identification, Landmark, LiftDistance, Lifted, LoneOrgan, Observation, Pace, Pull, default_priors,
 };
 use trocar_phantom::RecordOptions;
 use trocar_specimen::{
@@ -22,7 +22,7 @@ const ORGAN: &str = "appendix";
 const TRUE_CELL: f64 = 2.5e-3;
 const TRUE_MODEL: MaterialModel = MaterialModel::Corotated;
 
-/// Change of a parameter's score that the lifts must show for it to be observable: the ends of an
+/// Change of a parameter's score that lifts must tell for it to be observable: the ends of an
 /// interval half as wide as the prior's are so far from its middle.
 const CHANGE: f64 = 0.5 * NINETY;
 
@@ -67,8 +67,8 @@ pub(super) struct Phantom {
     organ: LoneOrgan,
     truth: Vec<(Parameter, f64)>,
     lifts: Vec<Observation>,
-    /// By parameter, how far landmarks of the fitted lifts move with it; see [`motions`].
-    motions: Vec<Option<f64>>,
+    /// By parameter, how well the fitted lifts tell it; see [`distances`].
+    distances: Vec<Option<f64>>,
 }
 
 impl Phantom {
@@ -93,8 +93,8 @@ impl Phantom {
             if let Some(lifted) = lifted {
                 let seen = |(number, (pull, lifted))| observed(&held, number, pull, lifted, random.stream(3));
                 let lifts: Vec<Observation> = ways.iter().zip(&lifted).enumerate().map(seen).collect();
-                let motions = motions(&held, &truth, &ways, &lifted, &lifts, progress)?;
-                return Ok(Self { seed, organ, truth, lifts, motions });
+                let distances = distances(&held, &truth, &lifts, progress)?;
+                return Ok(Self { seed, organ, truth, lifts, distances });
             }
         }
         Err(Error::Mismatch(format!("phantom {seed}: none of {DRAWS} draws of its tissue can be lifted")))
@@ -132,7 +132,7 @@ impl Phantom {
                 interval: told.interval,
                 width: told.width,
                 holds: (score - mean).abs() <= NINETY * deviation,
-                moves_mm: self.motions[k].map(|moved| 1e3 * moved),
+                distance: self.distances[k],
             }
         });
         let parameters = parameters.collect();
@@ -167,38 +167,28 @@ impl Phantom {
     }
 }
 
-/// By parameter, how far the landmarks of the fitted lifts move (m, RMS) if its true value changes
-/// by [`CHANGE`], up or down, whichever moves them less. A change that cannot be simulated counts
-/// for nothing; None if neither can.
-fn motions(
+/// By parameter, how far the fitted lifts of a change of its true value by [`CHANGE`] are from the
+/// true ones, in deviations of their measurement: up or down, whichever is nearer. None if neither
+/// can be simulated.
+fn distances(
     held: &LoneOrgan,
     truth: &[(Parameter, f64)],
-    ways: &[Pull],
-    lifted: &[Lifted],
     lifts: &[Observation],
     progress: &dyn Progress,
 ) -> Result<Vec<Option<f64>>> {
-    let fitted: Vec<usize> = (0..LIFTS).filter(|k| is_fitted(*k)).collect();
-    let ways: Vec<Pull> = fitted.iter().map(|k| ways[*k]).collect();
-    let moved = |k: usize, change: f64| -> Result<Option<f64>> {
+    let fitted: Vec<Observation> = lifts.iter().filter(|lift| is_fitted(lift.number)).cloned().collect();
+    let Some(from_truth) = LiftDistance::from(held, &fitted, progress)? else { return Ok(vec![None; truth.len()]) };
+    let to = |k: usize, change: f64| {
         let prior = &default_priors()[k];
         let mut values = truth.to_vec();
         values[k].1 = prior.name.value(prior.range, prior.name.score(prior.range, truth[k].1) + change);
-        let other = held.with(|organ| Posterior::apply(&values, organ));
-        let mut squares = Vec::new();
-        for (lift, there) in fitted.iter().zip(other.lift(&ways, Pace::QUICK, progress)?) {
-            let Some(there) = there else { return Ok(None) };
-            let places: Vec<DVec3> = lifts[*lift].landmarks.iter().map(|landmark| landmark.rest).collect();
-            let (here, there) = (held.motions(&lifted[*lift], places.clone()), other.motions(&there, places));
-            squares.extend(here.iter().zip(&there).map(|(a, b)| a.distance_squared(*b)));
-        }
-        Ok((!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()))
+        from_truth.to(&held.with(|organ| Posterior::apply(&values, organ)), progress)
     };
-    let least = |k: usize| {
-        let both = [moved(k, -CHANGE)?, moved(k, CHANGE)?];
+    let nearer = |k: usize| {
+        let both = [to(k, -CHANGE)?, to(k, CHANGE)?];
         Ok(both.into_iter().flatten().min_by(f64::total_cmp))
     };
-    (0..truth.len()).map(least).collect()
+    (0..truth.len()).map(nearer).collect()
 }
 
 /// The appendix of phantom A with the true mesh.

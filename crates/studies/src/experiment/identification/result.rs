@@ -2,7 +2,7 @@
 
 use crate::trials::Resumed;
 use serde::{Deserialize, Serialize};
-use trocar_specimen::Parameter;
+use trocar_specimen::{NINETY, Parameter};
 
 /// What the tracker's noise moves a landmark by (mm, RMS).
 pub(super) const NOISE_MM: f64 = 1e3 * super::phantom::TRACKER * 1.732_050_807_568_877_2;
@@ -24,9 +24,10 @@ pub struct ParameterRow {
     pub width: f64,
     /// Whether the 90% interval holds the truth.
     pub holds: bool,
-    /// How far landmarks of the fitted lifts move (mm, RMS) if the true value changes by half of the
-    /// prior's interval, from the middle to either end, whichever moves them less.
-    pub moves_mm: Option<f64>,
+    /// How far the fitted lifts are from the true ones, in deviations of their measurement, if the
+    /// true value changes as from the middle of an interval half as wide as the prior's to its
+    /// nearer end.
+    pub distance: Option<f64>,
 }
 
 /// One fit of one phantom.
@@ -59,11 +60,11 @@ pub struct FitRow {
 }
 
 impl FitRow {
-    /// Whether the fitted lifts tell a parameter: its change moves their landmarks by more than the
-    /// tracker's noise.
+    /// Whether the fitted lifts can tell a parameter half as wide as the prior: with all others
+    /// known, the ends of the interval could be told from its middle with 90% confidence.
     fn observes(&self, parameter: Parameter) -> bool {
         let own = self.parameters.iter().find(|p| p.parameter == parameter.name());
-        own.and_then(|p| p.moves_mm).is_some_and(|moved| moved > NOISE_MM)
+        own.and_then(|p| p.distance).is_some_and(|distance| distance > NINETY)
     }
 }
 
@@ -84,8 +85,8 @@ pub struct CoverageRow {
     pub width: f64,
     /// Phantoms of which it is at most half as wide.
     pub identified: usize,
-    /// Phantoms in which it is observable: its change by half of the prior's interval, from the
-    /// middle to either end, moves landmarks of the fitted lifts by more than the tracker's noise.
+    /// Phantoms in which it is observable: with all others known, the fitted lifts could tell the
+    /// ends of an interval half as wide as the prior's from its middle.
     pub observable: usize,
     /// Median width over the prior's in these.
     pub observable_width: Option<f64>,
@@ -200,7 +201,7 @@ mod tests {
                     interval: [0.05, 0.1, 0.2],
                     width,
                     holds,
-                    moves_mm: Some(if parameter == Parameter::BaseLength { 2.0 } else { 0.3 * phantom as f64 }),
+                    distance: Some(if parameter == Parameter::BaseLength { 9.0 } else { phantom as f64 }),
                 })
                 .to_vec(),
             diverged: 0,
@@ -216,7 +217,7 @@ mod tests {
         let base = &coverage("default", &all)[0];
         assert_eq!((base.holds, base.phantoms, base.identified, base.width), (2, 3, 2, 0.3));
         assert_eq!((base.observable, base.observable_width), (3, Some(0.3)));
-        // The first phantom's slack moves landmarks by less than the noise.
+        // Lifts of the first phantom do not tell the slack.
         let slack = &coverage("default", &all)[2];
         assert_eq!((slack.phantoms, slack.observable, slack.observable_width), (3, 2, Some(0.5)));
         assert_eq!(support_width(&coverage("default", &all)), Some(0.5));
