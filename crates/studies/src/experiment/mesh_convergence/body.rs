@@ -99,6 +99,11 @@ impl TestBody {
         (self.mesh.vertices.len(), self.mesh.tets.len())
     }
 
+    /// Size of its box (m).
+    pub fn extent(&self) -> DVec3 {
+        self.mesh.bounds().map_or(DVec3::ZERO, |(low, high)| high - low)
+    }
+
     /// Mean of the nodes about an organ coordinate.
     fn centre(&self, s: f64) -> DVec3 {
         let near = self.mesh.vertices.iter().zip(&self.axis.s).filter(|(_, own)| (**own - s).abs() < 0.04);

@@ -35,6 +35,9 @@ pub struct MeshConvergenceExperiment {
     /// Cells of the lattices (mm).
     #[arg(long = "lattice-mm", value_delimiter = ',', default_values_t = [4.0, 3.0, 2.3, 1.5])]
     pub lattice_mm: Vec<f64>,
+    /// Cells of further lattices along the longest axis; the paper's hexahedra are 16.
+    #[arg(long = "lattice-cells", value_delimiter = ',', default_values_t = [16])]
+    pub lattice_cells: Vec<u32>,
     /// Meshes in parallel; all threads by default. The figures do not depend on it.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
@@ -54,7 +57,7 @@ impl Study for MeshConvergenceExperiment {
         job.claim()?;
         let (specimen, _) = self.appendix.read(job.output(), job.progress)?;
         let body = TestBody::of(&specimen)?;
-        let trials: Vec<Trial> = self.poisson_ratios.iter().flat_map(|nu| self.trials(*nu)).collect();
+        let trials: Vec<Trial> = self.poisson_ratios.iter().flat_map(|nu| self.trials(*nu, &body)).collect();
         let fingerprint = xxh3_64(format!("{:?} {:?}", body.mesh.vertices, body.mesh.tets).as_bytes());
         let settings = format!("{fingerprint:016x}");
         let Outcomes { rows, resumed } =
@@ -76,10 +79,12 @@ impl MeshConvergenceExperiment {
         };
         within(&self.poisson_ratios, 0.0..=0.4999, "--poisson")?;
         within(&self.coarser, 1.0..=3.0, "--coarser")?;
-        within(&self.lattice_mm, 0.8..=10.0, "--lattice-mm")
+        within(&self.lattice_mm, 0.8..=10.0, "--lattice-mm")?;
+        let cells: Vec<f64> = self.lattice_cells.iter().map(|count| f64::from(*count)).collect();
+        within(&cells, 8.0..=64.0, "--lattice-cells")
     }
 
-    fn trials(&self, nu: f64) -> Vec<Trial> {
+    fn trials(&self, nu: f64, body: &TestBody) -> Vec<Trial> {
         let coarser = self.coarser.iter().map(|by| Method::LinearCoarser { by: *by });
         let own = [
             Method::Quadratic,
@@ -89,7 +94,10 @@ impl MeshConvergenceExperiment {
             Method::LinearFiner,
             Method::Patches,
         ];
-        let lattices = self.lattice_mm.iter().map(|mm| Method::Lattice { cell: 1e-3 * mm });
+        let longest = body.extent().max_element();
+        let along = self.lattice_cells.iter().map(|count| longest / f64::from(*count));
+        let sized = self.lattice_mm.iter().map(|mm| 1e-3 * mm);
+        let lattices = along.chain(sized).map(|cell| Method::Lattice { cell });
         own.into_iter().chain(coarser).chain(lattices).map(|method| Trial { method, nu }).collect()
     }
 }
