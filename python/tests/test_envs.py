@@ -288,7 +288,7 @@ def test_a_forked_child_is_refused_and_makes_its_own(one):
 
 @pytest.mark.skipif(os.name == "nt", reason="a process cannot be sent Ctrl-C so")
 def test_ctrl_c_stops_the_construction_of_many_cells():
-    # Building all of them would take minutes.
+    # Making all of them would take much longer.
     press = threading.Timer(2.0, os.kill, (os.getpid(), signal.SIGINT))
     press.start()
     began = time.monotonic()

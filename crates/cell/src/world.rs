@@ -178,8 +178,8 @@ impl World {
         Ok(Self { model, state, axes, toughness, up, stepper, cuts: 0 })
     }
 
-    /// A world of its own in the same state. Its bodies are shared, so that it costs little beside
-    /// building and settling another.
+    /// A world of its own in the same state. Bodies are shared, so that it costs little beside
+    /// building and settling another. Forces and events of the last frame are not copied.
     ///
     /// # Errors
     /// Threads that the system refuses.

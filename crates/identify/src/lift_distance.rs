@@ -21,8 +21,8 @@ pub struct LiftDistance {
 }
 
 impl LiftDistance {
-    /// Distances from the lifts of `organ` as `lifts` were pulled; their forces do not count. None
-    /// if one diverges.
+    /// Distances from the lifts of `organ` with the measured pulls of `lifts`. Measured forces are
+    /// ignored. None if a lift diverges.
     ///
     /// # Errors
     /// An organ that cannot be simulated, an interruption.

@@ -133,7 +133,9 @@ impl Cells {
             // One cell uses all threads. With several cells, each uses one.
             let each = if count == 1 { threads } else { 1 };
             let seed = split.seed(0);
-            let first = Episode::begun(&scene, Box::new(specimens.clone()), each, seed, scene.draw(seed));
+            // In the pool, because the threads of rayon's own would be missing in a forked child.
+            let first =
+                pool.install(|| Episode::begun(&scene, Box::new(specimens.clone()), each, seed, scene.draw(seed)));
             let episodes = copies(first.map_err(|e| crate::error::task(&e))?, count, &pool, &specimens)?;
             let bounds = Bounds::new(episodes[0].cell(), space).map_err(|e| crate::error::task(&e))?;
             let steps = (scene.task.episode_s * f64::from(scene.rates.control_hz)).round() as usize;

@@ -153,7 +153,7 @@ impl Episode {
     }
 
     /// An episode of its own in the same state, with the specimens of `supply`. It goes on with the
-    /// same bits, and costs little beside beginning another: nothing is built or settled.
+    /// same bits, and costs little beside beginning another: organs are not built or settled again.
     ///
     /// # Errors
     /// Threads that the system refuses.

@@ -56,7 +56,7 @@ fn a_clone_goes_on_with_the_same_bits_and_alone() {
     };
     let before = episode.state_hash();
     let next = on(&mut clone);
-    assert_eq!(episode.state_hash(), before, "a step of the clone moves nothing else");
+    assert_eq!(episode.state_hash(), before, "a step of the clone does not move the first");
     assert_eq!(on(&mut episode), next);
     assert_eq!(steps(&mut clone, 2), steps(&mut episode, 2), "another world than the one that was cloned");
 }

@@ -84,8 +84,8 @@ impl Stepper {
         Self::with_solvers(model, Box::new(solvers), false, dt, threads)
     }
 
-    /// Another stepper with the same settings, for `model`. It is as good as this one: a state gets
-    /// the same bits from both.
+    /// Another stepper with the same settings, for `model`: a state gets the same bits from both.
+    /// Forces and events of the last frame are not copied.
     ///
     /// # Errors
     /// A model of another backend, and threads that the system refuses.

@@ -47,8 +47,8 @@ impl CellState {
 }
 
 impl Cell {
-    /// A cell of its own in the same state. It shares what never changes, so that it costs little
-    /// beside building and settling another.
+    /// A cell of its own in the same state. Bodies are shared, so that it costs little beside
+    /// building and settling another. Forces and events of the last frame are not copied.
     ///
     /// # Errors
     /// Threads that the system refuses.

@@ -77,7 +77,7 @@ impl Study for IdentificationExperiment {
             let own = folder.join(format!("{}-{}", t.cell_mm, t.forces));
             Phantom::new(t.seed, &own, progress)?.fit(1e-3 * t.cell_mm, t.forces, progress)
         };
-        let Outcomes { rows, resumed } = job.trials("fits", "5", &trials, key, self.threads, run)?;
+        let Outcomes { rows, resumed } = job.trials("fits", "6", &trials, key, self.threads, run)?;
         let of = |cell_mm: f64, forces: bool| -> Vec<&FitRow> {
             rows.iter().filter(|r| r.cell_mm == cell_mm && r.forces == forces).collect()
         };

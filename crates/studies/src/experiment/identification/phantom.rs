@@ -12,7 +12,8 @@ use trocar_identify::{
 };
 use trocar_phantom::RecordOptions;
 use trocar_specimen::{
-    End, Material, MaterialModel, NINETY, Organ, OrganFacts, Parameter, Pins, Posterior, Provenance, Specimen,
+    End, Material, MaterialModel, NINETY, Organ, OrganFacts, Parameter, Pins, Posterior, Prior, Provenance, Scale,
+    Specimen,
 };
 
 /// The organ.
@@ -21,10 +22,6 @@ const ORGAN: &str = "appendix";
 /// Cells of the true tissue (m), and its law.
 const TRUE_CELL: f64 = 2.5e-3;
 const TRUE_MODEL: MaterialModel = MaterialModel::Corotated;
-
-/// Change of a parameter's score that lifts must tell for it to be observable: the ends of an
-/// interval half as wide as the prior's are so far from its middle.
-const CHANGE: f64 = 0.5 * NINETY;
 
 /// Lifts of a phantom: the paper tracks ten throughout.
 pub(super) const LIFTS: usize = 10;
@@ -167,9 +164,9 @@ impl Phantom {
     }
 }
 
-/// By parameter, how far the fitted lifts of a change of its true value by [`CHANGE`] are from the
-/// true ones, in deviations of their measurement: up or down, whichever is nearer. None if neither
-/// can be simulated.
+/// By parameter, how far the fitted lifts are from those of the ends of an interval half as wide as
+/// the prior's about the true value, in deviations of their measurement: of the nearer end. Ends
+/// beyond the prior's range, and those that cannot be simulated, do not count; None if none is left.
 fn distances(
     held: &LoneOrgan,
     truth: &[(Parameter, f64)],
@@ -178,17 +175,31 @@ fn distances(
 ) -> Result<Vec<Option<f64>>> {
     let fitted: Vec<Observation> = lifts.iter().filter(|lift| is_fitted(lift.number)).cloned().collect();
     let Some(from_truth) = LiftDistance::from(held, &fitted, progress)? else { return Ok(vec![None; truth.len()]) };
-    let to = |k: usize, change: f64| {
-        let prior = &default_priors()[k];
+    let to = |k: usize, value: f64| {
         let mut values = truth.to_vec();
-        values[k].1 = prior.name.value(prior.range, prior.name.score(prior.range, truth[k].1) + change);
+        values[k].1 = value;
         from_truth.to(&held.with(|organ| Posterior::apply(&values, organ)), progress)
     };
-    let nearer = |k: usize| {
-        let both = [to(k, -CHANGE)?, to(k, CHANGE)?];
-        Ok(both.into_iter().flatten().min_by(f64::total_cmp))
+    let nearer = |(k, prior): (usize, &Prior)| {
+        let mut both = Vec::new();
+        for end in ends(prior, truth[k].1).into_iter().flatten() {
+            both.extend(to(k, end)?);
+        }
+        Ok(both.into_iter().min_by(f64::total_cmp))
     };
-    (0..truth.len()).map(nearer).collect()
+    default_priors().iter().enumerate().map(nearer).collect()
+}
+
+/// The ends of an interval half as wide as the prior's about a value; None where that is beyond the
+/// prior's range.
+fn ends(prior: &Prior, value: f64) -> [Option<f64>; 2] {
+    let [least, most] = [-NINETY, NINETY].map(|score| prior.name.value(prior.range, score));
+    let ends = match prior.name.scale() {
+        Scale::Linear => [-0.25, 0.25].map(|share| value + share * (most - least)),
+        Scale::Log => [-0.25, 0.25].map(|share| value * (most / least).powf(share)),
+    };
+    let [low, high] = prior.range;
+    ends.map(|end| Some(end).filter(|end| low < *end && *end < high))
 }
 
 /// The appendix of phantom A with the true mesh.
@@ -270,5 +281,26 @@ fn observed(organ: &LoneOrgan, number: usize, pull: &Pull, lifted: &Lifted, rand
         },
         landmarks: places.iter().zip(&fronts).zip(&moved).enumerate().map(landmark).collect(),
         force: Some(lifted.force + noise(3, FORCE * lifted.force.length())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ends_are_those_of_an_interval_half_as_wide_as_the_priors() {
+        for prior in default_priors() {
+            let middle = prior.name.value(prior.range, 0.0);
+            let [low, high] = ends(&prior, middle).map(Option::unwrap);
+            let [least, most] = [-NINETY, NINETY].map(|score| prior.name.value(prior.range, score));
+            let width = match prior.name.scale() {
+                Scale::Linear => (high - low) / (most - least),
+                Scale::Log => (high / low).ln() / (most / least).ln(),
+            };
+            assert!((width - 0.5).abs() < 1e-9, "{}: {width}", prior.name.name());
+            // Near an end of the range there is only one of them.
+            assert!(matches!(ends(&prior, prior.name.value(prior.range, 2.5)), [Some(_), None]));
+        }
     }
 }

@@ -24,9 +24,9 @@ pub struct ParameterRow {
     pub width: f64,
     /// Whether the 90% interval holds the truth.
     pub holds: bool,
-    /// How far the fitted lifts are from the true ones, in deviations of their measurement, if the
-    /// true value changes as from the middle of an interval half as wide as the prior's to its
-    /// nearer end.
+    /// Distance of the fitted lifts from those at the ends of an interval half as wide as the
+    /// prior's about the true value, in deviations of their landmarks' measurement: of the nearer
+    /// end.
     pub distance: Option<f64>,
 }
 
@@ -60,8 +60,9 @@ pub struct FitRow {
 }
 
 impl FitRow {
-    /// Whether the fitted lifts can tell a parameter half as wide as the prior: with all others
-    /// known, the ends of the interval could be told from its middle with 90% confidence.
+    /// Whether landmarks of the fitted lifts can tell a parameter to half of the prior's width: with
+    /// all others known, the ends of such an interval could be told from the true value with 90%
+    /// confidence.
     fn observes(&self, parameter: Parameter) -> bool {
         let own = self.parameters.iter().find(|p| p.parameter == parameter.name());
         own.and_then(|p| p.distance).is_some_and(|distance| distance > NINETY)
@@ -85,8 +86,8 @@ pub struct CoverageRow {
     pub width: f64,
     /// Phantoms of which it is at most half as wide.
     pub identified: usize,
-    /// Phantoms in which it is observable: with all others known, the fitted lifts could tell the
-    /// ends of an interval half as wide as the prior's from its middle.
+    /// Phantoms in which it is observable: with all others known, landmarks of the fitted lifts could
+    /// tell the true value from the ends of an interval half as wide as the prior's.
     pub observable: usize,
     /// Median width over the prior's in these.
     pub observable_width: Option<f64>,

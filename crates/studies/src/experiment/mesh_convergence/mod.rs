@@ -35,7 +35,7 @@ pub struct MeshConvergenceExperiment {
     /// Cells of the lattices (mm).
     #[arg(long = "lattice-mm", value_delimiter = ',', default_values_t = [4.0, 3.0, 2.3, 1.5])]
     pub lattice_mm: Vec<f64>,
-    /// Cells of further lattices along the longest axis; the paper's hexahedra are 16.
+    /// Further lattices, by their cells along the longest axis; the paper's hexahedra have 16.
     #[arg(long = "lattice-cells", value_delimiter = ',', default_values_t = [16])]
     pub lattice_cells: Vec<u32>,
     /// Meshes in parallel; all threads by default. The figures do not depend on it.
