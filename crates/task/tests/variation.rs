@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
 use std::sync::Arc;
-use trocar_cell::{Action, Setpoint};
-use trocar_scene::{Distribution, Factor, Scene, SpecimenSource, TissueSource, VariationSet};
+use trocar_cell::{Action, ActionSpace, CellEvent, Setpoint};
+use trocar_scene::{BackendName, Distribution, Factor, Scene, SpecimenSource, TissueSource, VariationSet};
 use trocar_specimen::{Parameter, Posterior, Prior, Specimen, Threads};
-use trocar_task::{Episode, EpisodeFile, Result, SpecimenSupply, policy, run};
+use trocar_task::{Episode, EpisodeFile, Result, SpecimenSupply, Step, policy, run};
 use trocar_testing::tube::{ONE_END, resection, two_tubes};
 
 /// Another tube for each seed of an anatomy.
@@ -44,21 +44,35 @@ fn steps(episode: &mut Episode, seed: u64) -> Vec<u64> {
 
 #[test]
 fn a_clone_goes_on_with_the_same_bits_and_alone() {
-    let scene = scene(VariationSet::Standard);
-    let mut episode = Episode::with_specimens(&scene, Box::new(Tubes), 1).unwrap();
-    steps(&mut episode, 1);
-    let mut clone = episode.try_clone(Box::new(Tubes)).unwrap();
-    assert_eq!((clone.state_hash(), clone.rows()), (episode.state_hash(), episode.rows()));
-    let on = |episode: &mut Episode| {
-        let at: Vec<Setpoint> = episode.cell().observe().iter().map(|a| a.commanded).collect();
-        episode.step(&Action::targets(&at)).unwrap();
-        episode.state_hash()
-    };
-    let before = episode.state_hash();
-    let next = on(&mut clone);
-    assert_eq!(episode.state_hash(), before, "a step of the clone does not move the first");
-    assert_eq!(on(&mut episode), next);
-    assert_eq!(steps(&mut clone, 2), steps(&mut episode, 2), "another world than the one that was cloned");
+    for backend in [BackendName::Tetrahedra, BackendName::Lattice] {
+        let mut scene = scene(VariationSet::Standard);
+        scene.tissue.backend = backend;
+        scene.rates.control_delay_ms = 50.0;
+        scene.task.episode_s = 6.0;
+        let mut episode = Episode::with_specimens(&scene, Box::new(Tubes), 1).unwrap();
+        // Up to when the jaws hold the tube.
+        let mut held = false;
+        let mut until_held = |step: &Step| {
+            held |= step.events.iter().any(|event| matches!(event, CellEvent::Attached { .. }));
+            !held
+        };
+        let mut scripted = policy::named("scripted").unwrap();
+        run(&mut episode, scripted.as_mut(), 1, &mut until_held).unwrap_err();
+        assert!(held, "the script grasps the tube");
+        let mut clone = episode.try_clone(Box::new(Tubes)).unwrap();
+        assert_eq!((clone.state_hash(), clone.rows()), (episode.state_hash(), episode.rows()));
+        let on = |episode: &mut Episode, rise: f64| {
+            let mut numbers = vec![0.0; 10];
+            numbers[2] = rise;
+            episode.step(&Action { space: ActionSpace::Tip, numbers }).unwrap();
+            episode.state_hash()
+        };
+        let before = episode.state_hash();
+        let next: Vec<u64> = (0..4).map(|_| on(&mut clone, 1e-3)).collect();
+        assert_eq!(episode.state_hash(), before, "a step of the clone does not move the first");
+        assert_eq!((0..4).map(|_| on(&mut episode, 1e-3)).collect::<Vec<_>>(), next);
+        assert_eq!(steps(&mut clone, 2), steps(&mut episode, 2), "another world than the one that was cloned");
+    }
 }
 
 #[test]
