@@ -15,7 +15,8 @@ use trocar_geometry::Skin;
 pub struct LiftDistance {
     lifts: Vec<Observation>,
     bound: Vec<Skin>,
-    /// The numbers of each lift (m), and how they change with a deviation of each error of its pull.
+    /// The numbers of each lift (m), and how they change with a deviation of each error of its
+    /// pull.
     numbers: Vec<Vec<f64>>,
     pulls: Vec<[Vec<f64>; PULL_ERRORS]>,
 }
@@ -73,8 +74,8 @@ fn lifted(
     Ok(each.map(|((lift, bound), lifted)| Some(lift.predicted(organ, lifted.as_ref()?, bound))).collect())
 }
 
-/// The square of a distance: off' K^-1 off with K = t^2 + P P', the tracker's noise t and the errors
-/// of the pull P, by Woodbury's formula.
+/// The square of a distance: off' K^-1 off with K = t^2 + P P', the tracker's noise t and the
+/// errors of the pull P, by Woodbury's formula.
 fn squared(off: &[f64], pulls: &[Vec<f64>; PULL_ERRORS]) -> f64 {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / (TRACKER * TRACKER);
     let along = DVec4::from_array(std::array::from_fn(|k| dot(&pulls[k], off)));

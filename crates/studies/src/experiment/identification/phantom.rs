@@ -166,7 +166,8 @@ impl Phantom {
 
 /// By parameter, how far the fitted lifts are from those of the ends of an interval half as wide as
 /// the prior's about the true value, in deviations of their measurement: of the nearer end. Ends
-/// beyond the prior's range, and those that cannot be simulated, do not count; None if none is left.
+/// beyond the prior's range, and those that cannot be simulated, do not count; None if none is
+/// left.
 fn distances(
     held: &LoneOrgan,
     truth: &[(Parameter, f64)],

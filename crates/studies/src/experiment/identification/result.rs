@@ -60,9 +60,9 @@ pub struct FitRow {
 }
 
 impl FitRow {
-    /// Whether landmarks of the fitted lifts can tell a parameter to half of the prior's width: with
-    /// all others known, the ends of such an interval could be told from the true value with 90%
-    /// confidence.
+    /// Whether landmarks of the fitted lifts can tell a parameter to half of the prior's width:
+    /// with all others known, the ends of such an interval could be told from the true value with
+    /// 90% confidence.
     fn observes(&self, parameter: Parameter) -> bool {
         let own = self.parameters.iter().find(|p| p.parameter == parameter.name());
         own.and_then(|p| p.distance).is_some_and(|distance| distance > NINETY)
@@ -86,8 +86,8 @@ pub struct CoverageRow {
     pub width: f64,
     /// Phantoms of which it is at most half as wide.
     pub identified: usize,
-    /// Phantoms in which it is observable: with all others known, landmarks of the fitted lifts could
-    /// tell the true value from the ends of an interval half as wide as the prior's.
+    /// Phantoms in which it is observable: with all others known, landmarks of the fitted lifts
+    /// could tell the true value from the ends of an interval half as wide as the prior's.
     pub observable: usize,
     /// Median width over the prior's in these.
     pub observable_width: Option<f64>,
