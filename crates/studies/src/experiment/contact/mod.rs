@@ -50,7 +50,7 @@ pub struct ContactExperiment {
     pub cells: Vec<u16>,
     /// Elements over the thickness of finer layers, which the fast solver alone presses on.
     #[arg(long, value_name = "CELLS", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=16),
-          default_values_t = [8, 10, 12])]
+          default_values_t = [10, 12, 13, 14, 16])]
     pub finer: Vec<u16>,
     /// Young's modulus (Pa).
     #[arg(long, default_value_t = 5e3)]
