@@ -367,7 +367,9 @@ impl QuasiNewtonSolver {
 
     /// direction = P^-1 direction.
     pub fn precondition(&mut self) {
-        self.system.apply(self.level, &mut self.iterate.direction);
+        // Nothing but the solve keeps the momentum of a free body.
+        let precise = self.is_free();
+        self.system.apply(self.level, &mut self.iterate.direction, precise);
     }
 
     /// Turns the direction downhill; held nodes have none.

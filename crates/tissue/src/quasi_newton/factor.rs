@@ -132,17 +132,18 @@ impl Factor {
     }
 
     /// The first half of a solve in place: three numbers a node in the order of elimination. `x` is
-    /// at least 16 numbers longer, finite.
+    /// at least 16 numbers longer, finite. The factor of a large body is rounded to 8 bits unless
+    /// the solve is `precise`.
     #[inline(always)]
-    pub fn forward<S: Simd>(&mut self, simd: S, x: &mut [f32]) {
+    pub fn forward<S: Simd>(&mut self, simd: S, x: &mut [f32], precise: bool) {
         self.scale(x);
-        self.tiles.forward(simd, x);
+        self.tiles.forward(simd, x, precise);
     }
 
     /// The second half.
     #[inline(always)]
-    pub fn backward<S: Simd>(&mut self, simd: S, x: &mut [f32]) {
-        self.tiles.backward(simd, x);
+    pub fn backward<S: Simd>(&mut self, simd: S, x: &mut [f32], precise: bool) {
+        self.tiles.backward(simd, x, precise);
         self.scale(x);
     }
 

@@ -38,6 +38,7 @@ mod stiffened;
 mod stress;
 mod supernode;
 mod system;
+mod tile;
 mod tile_parts;
 mod tiles;
 mod tool_stiffness;

@@ -15,4 +15,6 @@ pub(super) struct Supernode {
     /// Its first tile: by columns of tiles, which both halves of a solve read one after another;
     /// those of the diagonal triangle first.
     pub tiles: usize,
+    /// Its first scale: those of the inverse's columns and rows, then those of the numbers below.
+    pub scales: usize,
 }

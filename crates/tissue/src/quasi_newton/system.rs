@@ -175,15 +175,16 @@ impl System {
         warp.update(level, layout, x);
     }
 
-    /// direction = P^-1 direction, P being the stiffness at rest turned with the tissue.
-    pub fn apply(&mut self, level: Level, direction: &mut [Row]) {
+    /// direction = P^-1 direction, P being the stiffness at rest turned with the tissue; of a large
+    /// body to some per cent unless `precise`.
+    pub fn apply(&mut self, level: Level, direction: &mut [Row], precise: bool) {
         let Self { warp, factor, update, right, .. } = self;
         let Some(factor) = factor else { return };
         dispatch!(level, simd => {
             warp.to_rest(simd, direction, right);
-            factor.forward(simd, right);
+            factor.forward(simd, right, precise);
             update.apply(simd, right);
-            factor.backward(simd, right);
+            factor.backward(simd, right, precise);
             warp.out_of_rest(simd, right, direction);
         });
     }
@@ -211,9 +212,9 @@ impl System {
             number.copy_from_slice(&(back * position(row)).to_array());
         }
         dispatch!(level, simd => {
-            factor.forward(simd, right);
+            factor.forward(simd, right, true);
             update.apply(simd, right);
-            factor.backward(simd, right);
+            factor.backward(simd, right, true);
         });
         for (row, number) in x.iter_mut().zip(right.chunks_exact(3)) {
             let turned = *rotation * Vec3A::from_slice(number);

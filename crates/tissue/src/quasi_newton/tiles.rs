@@ -1,31 +1,26 @@
 //! A Cholesky factor packed for speed, and the solve with it.
 //!
 //! A solve reads the whole factor twice and does one multiplication a number: it is bound by
-//! memory. So the factor is kept in 16 bits a number, in tiles of 16 x 16 numbers with one scale
-//! each, supernode by supernode. The triangle on a supernode's diagonal is kept as its inverse: a
-//! solve consists of products with tiles and waits for no division.
+//! memory. So the factor is kept in 8 bits a number, in tiles of 16 x 16 numbers, supernode by
+//! supernode. What that rounding leaves is kept in 8 bits more, apart: precise solves read both,
+//! and so do all solves with a small factor, which stays in a cache. A number has two scales: its
+//! row's and its column's in the supernode. The triangle on a supernode's diagonal is kept as its
+//! inverse: a solve consists of products with tiles and waits for no division. Vectors are rounded
+//! to 16 bits before they are multiplied, because processors multiply whole numbers faster.
 //!
-//! The backward half is the exact transpose of the forward half, tile by tile. So rounding the
-//! factor to 16 bits leaves the preconditioner symmetric and positive definite.
+//! The backward half is the transpose of the forward half, tile by tile. So rounding the factor
+//! leaves the preconditioner symmetric and positive definite, up to the rounding of vectors.
 
 use super::supernode::{Supernode, TILE_SIZE};
+use super::tile::{Tile, pairs, round, transpose_sum};
 use super::tile_parts::{Part, Parts};
 use super::tree::Tree;
 use crate::threads::for_each;
-use fearless_simd::{Level, Simd, SimdBase, SimdCvtFloat, dispatch, f32x16, i32x16};
+use fearless_simd::{Level, Simd, SimdBase, SimdCvtFloat, SimdCvtTruncate, dispatch, f32x16, i32x16};
 use std::ops::Range;
 
-/// Greatest number in 16 bits.
-const MAX_INT16: f32 = 32767.0;
-
-/// 16 x 16 numbers. A word has the numbers of two neighbouring columns: its low half is that of the
-/// even column; the whole word, over 65536, is that of the odd one (the low half adds less than its
-/// rounding, and is taken into account in it).
-#[derive(Clone, Copy)]
-#[repr(C, align(64))]
-struct Tile {
-    words: [[i32; TILE_SIZE]; TILE_SIZE / 2],
-}
+/// Tiles of the largest factor that is always read with its remainders.
+const MAX_SMALL: usize = 6000;
 
 /// The packed factor.
 pub(super) struct Tiles {
@@ -36,7 +31,11 @@ pub(super) struct Tiles {
     tree: Tree,
     parts: Parts,
     tiles: Vec<Tile>,
+    /// What rounding leaves of the tiles.
+    remainders: Vec<Tile>,
     scales: Vec<f32>,
+    /// Room for the tiles of a supernode before they are rounded: column by column.
+    unpacked: Vec<f32>,
     /// Room for the longest column of row tiles.
     buffer: Vec<f32>,
 }
@@ -54,7 +53,9 @@ impl Tiles {
             tree: Tree::default(),
             parts: Parts::default(),
             tiles: Vec::new(),
+            remainders: Vec::new(),
             scales: Vec::new(),
+            unpacked: Vec::new(),
             buffer: Vec::new(),
         }
     }
@@ -64,6 +65,7 @@ impl Tiles {
         self.supernodes.clear();
         self.rows.clear();
         self.tiles.clear();
+        self.remainders.clear();
         self.scales.clear();
     }
 
@@ -81,25 +83,12 @@ impl Tiles {
         let begin = self.rows.len();
         self.rows.extend(rows.map(|node| 3 * node));
         let height = 3 * (self.rows.len() - begin);
-        self.supernodes.push(Supernode { first, width, rows: begin..self.rows.len(), tiles: self.tiles.len() });
-        let columns = covering(width);
-        for j in 0..columns {
-            for i in j..columns {
-                self.pack(level, |r, c| {
-                    let (r, c) = (TILE_SIZE * i + r, TILE_SIZE * j + c);
-                    if r < width && c <= r { inverse(r, c) } else { 0.0 }
-                });
-            }
-        }
-        for j in 0..columns {
-            for i in 0..covering(height) {
-                self.pack(level, |r, c| {
-                    let (r, c) = (TILE_SIZE * i + r, TILE_SIZE * j + c);
-                    if r < height && c < width { below(r, c) } else { 0.0 }
-                });
-            }
-        }
-        self.buffer.resize(self.buffer.len().max(TILE_SIZE * (columns + covering(height)) + TILE_SIZE), 0.0);
+        let (tiles, scales) = (self.tiles.len(), self.scales.len());
+        self.supernodes.push(Supernode { first, width, rows: begin..self.rows.len(), tiles, scales });
+        let (columns, tall) = (covering(width), covering(height));
+        self.pack(level, columns, columns, true, |r, c| if r < width && c <= r { inverse(r, c) } else { 0.0 });
+        self.pack(level, tall, columns, false, |r, c| if r < height && c < width { below(r, c) } else { 0.0 });
+        self.buffer.resize(self.buffer.len().max(TILE_SIZE * (columns + tall) + TILE_SIZE), 0.0);
     }
 
     /// Ends the factor after its last supernode.
@@ -120,36 +109,47 @@ impl Tiles {
         self.parts.list.len()
     }
 
-    fn pack(&mut self, level: Level, at: impl Fn(usize, usize) -> f32) {
-        let mut numbers = [[0.0f32; TILE_SIZE]; TILE_SIZE];
-        let mut most = 0.0f32;
-        for c in 0..TILE_SIZE {
-            for r in 0..TILE_SIZE {
-                numbers[c][r] = at(r, c);
-                most = most.max(numbers[c][r].abs());
+    /// Adds `rows` x `columns` tiles of the numbers `at(row, column)`, of a `triangle` only those
+    /// from the diagonal down. Adds the scales of their columns, then those of their rows.
+    fn pack(&mut self, level: Level, rows: usize, columns: usize, triangle: bool, at: impl Fn(usize, usize) -> f32) {
+        let (height, width) = (TILE_SIZE * rows, TILE_SIZE * columns);
+        let (unpacked, scales) = (&mut self.unpacked, self.scales.len());
+        unpacked.clear();
+        self.scales.resize(scales + width + height, 0.0);
+        let (of_columns, of_rows) = self.scales[scales..].split_at_mut(width);
+        // Numbers are divided by the greatest of their column, then by the greatest of their row.
+        for (c, scale) in of_columns.iter_mut().enumerate() {
+            let begin = unpacked.len();
+            unpacked.extend((0..height).map(|r| at(r, c)));
+            let column = &mut unpacked[begin..];
+            *scale = column.iter().fold(0.0, |most: f32, x| most.max(x.abs()));
+            let per_unit = if *scale > 0.0 { 1.0 / *scale } else { 0.0 };
+            for (x, most) in column.iter_mut().zip(&mut *of_rows) {
+                *x *= per_unit;
+                *most = most.max(x.abs());
             }
         }
-        let scale = if most > 0.0 { most / MAX_INT16 } else { 1.0 };
-        let mut tile = Tile { words: [[0; TILE_SIZE]; TILE_SIZE / 2] };
-        // With the CPU's instructions for rounding.
-        dispatch!(level, _simd => {
-            for (pair, words) in tile.words.iter_mut().enumerate() {
-                for (r, word) in words.iter_mut().enumerate() {
-                    let even = (numbers[2 * pair][r] / scale).round();
-                    let odd = (numbers[2 * pair + 1][r] / scale - even / 65536.0).round().clamp(-MAX_INT16, MAX_INT16);
-                    *word = (odd as i32) * 65536 + i32::from(even as i16);
-                }
+        let per_unit: Vec<f32> = of_rows.iter().map(|most| if *most > 0.0 { 1.0 / most } else { 0.0 }).collect();
+        for j in 0..columns {
+            for i in if triangle { j } else { 0 }..rows {
+                let [tile, remainder] = Tile::pack(level, |r, c| {
+                    let (r, c) = (TILE_SIZE * i + r, TILE_SIZE * j + c);
+                    unpacked[height * c + r] * per_unit[r]
+                });
+                self.tiles.push(tile);
+                self.remainders.push(remainder);
             }
-        });
-        self.tiles.push(tile);
-        // Both halves come out 65536 times too large.
-        self.scales.push(scale / 65536.0);
+        }
+        for scale in of_rows {
+            *scale /= Tile::UNIT;
+        }
     }
 
     /// Solves L y = x in place: `x` is three numbers a node in the order of elimination, padded by
-    /// at least 16.
+    /// at least 16. A `precise` solve has 16 bits of each number of the factor, another may have 8.
     #[inline(always)]
-    pub fn forward<S: Simd>(&mut self, simd: S, x: &mut [f32]) {
+    pub fn forward<S: Simd>(&mut self, simd: S, x: &mut [f32], precise: bool) {
+        let precise = precise || self.is_small();
         let (mut buffer, mut parts) = (std::mem::take(&mut self.buffer), std::mem::take(&mut self.parts));
         let (whole, level) = (&*x, simd.level());
         for_each(&mut parts.list, |part| {
@@ -157,7 +157,7 @@ impl Tiles {
             let Part { supernodes, vector, buffer, .. } = part;
             // Another thread has to ask for its instruction set itself.
             dispatch!(level, simd => for s in &self.supernodes[supernodes.clone()] {
-                self.eliminate(simd, s, vector, buffer);
+                self.eliminate(simd, s, vector, buffer, precise);
             });
         });
         for part in &parts.list {
@@ -165,24 +165,25 @@ impl Tiles {
             part.end(x);
         }
         for s in &parts.above {
-            self.eliminate(simd, &self.supernodes[*s], x, &mut buffer);
+            self.eliminate(simd, &self.supernodes[*s], x, &mut buffer, precise);
         }
         (self.buffer, self.parts) = (buffer, parts);
     }
 
-    /// Solves L' x = y in place.
+    /// Solves L' x = y in place; as precise as the forward half.
     #[inline(always)]
-    pub fn backward<S: Simd>(&mut self, simd: S, x: &mut [f32]) {
+    pub fn backward<S: Simd>(&mut self, simd: S, x: &mut [f32], precise: bool) {
+        let precise = precise || self.is_small();
         let (mut buffer, mut parts) = (std::mem::take(&mut self.buffer), std::mem::take(&mut self.parts));
         for s in parts.above.iter().rev() {
-            self.substitute(simd, &self.supernodes[*s], x, &mut buffer);
+            self.substitute(simd, &self.supernodes[*s], x, &mut buffer, precise);
         }
         let (whole, level) = (&*x, simd.level());
         for_each(&mut parts.list, |part| {
             part.read(&parts.numbers, whole);
             let Part { supernodes, vector, buffer, .. } = part;
             dispatch!(level, simd => for s in self.supernodes[supernodes.clone()].iter().rev() {
-                self.substitute(simd, s, vector, buffer);
+                self.substitute(simd, s, vector, buffer, precise);
             });
         });
         for part in &parts.list {
@@ -192,8 +193,8 @@ impl Tiles {
     }
 
     /// Solves L y = x in place for an `x` that has numbers only in the chain of supernodes from
-    /// that of `number` up to the root, and is 0 elsewhere. Writes the numbers of these supernodes
-    /// to `ranges`.
+    /// that of `number` up to the root, and is 0 elsewhere; precisely. Writes the numbers of these
+    /// supernodes to `ranges`.
     #[inline(always)]
     pub fn forward_chain<S: Simd>(&mut self, simd: S, number: usize, x: &mut [f32], ranges: &mut Vec<Range<usize>>) {
         let (mut buffer, mut parts) = (std::mem::take(&mut self.buffer), std::mem::take(&mut self.parts));
@@ -202,7 +203,7 @@ impl Tiles {
         if let Some(part) = parts.list.iter_mut().find(|part| part.numbers.contains(&number)) {
             part.begin(x);
             while let Some(s) = next.filter(|s| part.supernodes.contains(s)) {
-                self.eliminate(simd, &self.supernodes[s], &mut part.vector, &mut part.buffer);
+                self.eliminate(simd, &self.supernodes[s], &mut part.vector, &mut part.buffer, true);
                 ranges.push(self.tree.numbers(s));
                 next = self.tree.parent(s);
             }
@@ -210,7 +211,7 @@ impl Tiles {
             part.end(x);
         }
         while let Some(s) = next {
-            self.eliminate(simd, &self.supernodes[s], x, &mut buffer);
+            self.eliminate(simd, &self.supernodes[s], x, &mut buffer, true);
             ranges.push(self.tree.numbers(s));
             next = self.tree.parent(s);
         }
@@ -219,32 +220,27 @@ impl Tiles {
 
     /// y = inverse b, and the rows below lose their product with y.
     #[inline(always)]
-    fn eliminate<S: Simd>(&self, simd: S, s: &Supernode, x: &mut [f32], buffer: &mut [f32]) {
-        let columns = covering(s.width);
+    fn eliminate<S: Simd>(&self, simd: S, s: &Supernode, x: &mut [f32], buffer: &mut [f32], precise: bool) {
         let rows = &self.rows[s.rows.clone()];
-        let tall = covering(3 * rows.len());
-        let (y, below) = buffer.split_at_mut(TILE_SIZE * columns);
+        let (y, below) = buffer.split_at_mut(TILE_SIZE * covering(s.width));
+        let below = &mut below[..TILE_SIZE * covering(3 * rows.len())];
+        let [inverse, under] = self.scales_of(s, y.len(), below.len());
         y.fill(0.0);
-        below[..TILE_SIZE * tall].fill(0.0);
+        below.fill(0.0);
         let mut at = s.tiles;
-        for j in 0..columns {
-            // Beyond the width other supernodes' numbers are read: their tiles are 0 there.
+        for (j, scales) in inverse.columns.chunks_exact(TILE_SIZE).enumerate() {
+            // Beyond the width other supernodes' numbers are read: their scales are 0 there.
             let b = &x[s.first + TILE_SIZE * j..s.first + TILE_SIZE * (j + 1)];
-            for sum in y[TILE_SIZE * j..].chunks_exact_mut(TILE_SIZE) {
-                self.product(simd, at, b, f32x16::from_slice(simd, sum)).store_slice(sum);
-                at += 1;
-            }
+            self.add_product(simd, &mut at, b, scales, &mut y[TILE_SIZE * j..], precise);
         }
+        multiply(simd, y, inverse.rows);
         x[s.first..s.first + s.width].copy_from_slice(&y[..s.width]);
-        for y in y.chunks_exact(TILE_SIZE) {
-            for sum in below[..TILE_SIZE * tall].chunks_exact_mut(TILE_SIZE) {
-                self.product(simd, at, y, f32x16::from_slice(simd, sum)).store_slice(sum);
-                at += 1;
-            }
+        for (y, scales) in y.chunks_exact(TILE_SIZE).zip(under.columns.chunks_exact(TILE_SIZE)) {
+            self.add_product(simd, &mut at, y, scales, below, precise);
         }
-        for (k, row) in rows.iter().enumerate() {
+        multiply(simd, below, under.rows);
+        for (row, by) in rows.iter().zip(below.chunks_exact(3)) {
             let to = &mut x[*row as usize..*row as usize + 3];
-            let by = &below[3 * k..3 * k + 3];
             for c in 0..3 {
                 to[c] -= by[c];
             }
@@ -253,83 +249,107 @@ impl Tiles {
 
     /// x = inverse' (y - below' x_below).
     #[inline(always)]
-    fn substitute<S: Simd>(&self, simd: S, s: &Supernode, x: &mut [f32], buffer: &mut [f32]) {
-        let columns = covering(s.width);
+    fn substitute<S: Simd>(&self, simd: S, s: &Supernode, x: &mut [f32], buffer: &mut [f32], precise: bool) {
         let rows = &self.rows[s.rows.clone()];
-        let tall = covering(3 * rows.len());
-        let (z, below) = buffer.split_at_mut(TILE_SIZE * columns);
-        for (k, row) in rows.iter().enumerate() {
-            below[3 * k..3 * k + 3].copy_from_slice(&x[*row as usize..*row as usize + 3]);
+        let (z, below) = buffer.split_at_mut(TILE_SIZE * covering(s.width));
+        let below = &mut below[..TILE_SIZE * covering(3 * rows.len())];
+        let [inverse, under] = self.scales_of(s, z.len(), below.len());
+        for (row, to) in rows.iter().zip(below.chunks_exact_mut(3)) {
+            to.copy_from_slice(&x[*row as usize..*row as usize + 3]);
         }
-        below[3 * rows.len()..TILE_SIZE * tall].fill(0.0);
+        below[3 * rows.len()..].fill(0.0);
         z[..s.width].copy_from_slice(&x[s.first..s.first + s.width]);
         z[s.width..].fill(0.0);
+        let columns = z.len() / TILE_SIZE;
         let mut at = s.tiles + columns * (columns + 1) / 2;
-        for z in z.chunks_exact_mut(TILE_SIZE) {
-            let sum = self.transposed(simd, at, &below[..TILE_SIZE * tall]);
+        let unit = round(simd, below, under.rows);
+        for (z, scales) in z.chunks_exact_mut(TILE_SIZE).zip(under.columns.chunks_exact(TILE_SIZE)) {
+            let sum = self.transposed(simd, at, below, precise) * f32x16::from_slice(simd, scales) * unit;
             (f32x16::from_slice(simd, z) - sum).store_slice(z);
-            at += tall;
+            at += below.len() / TILE_SIZE;
         }
         let mut at = s.tiles;
-        for j in 0..columns {
+        let unit = round(simd, z, inverse.rows);
+        for (j, scales) in inverse.columns.chunks_exact(TILE_SIZE).enumerate() {
             // Only columns after j are read of z from here on.
-            let out = self.transposed(simd, at, &z[TILE_SIZE * j..]);
+            let out = self.transposed(simd, at, &z[TILE_SIZE * j..], precise) * f32x16::from_slice(simd, scales) * unit;
             out.store_slice(&mut z[TILE_SIZE * j..TILE_SIZE * (j + 1)]);
             at += columns - j;
         }
         x[s.first..s.first + s.width].copy_from_slice(&z[..s.width]);
     }
 
-    /// sum + tile y.
+    /// The scales of the inverse and of the numbers below, which are `width` and `height` tall.
     #[inline(always)]
-    fn product<S: Simd>(&self, simd: S, at: usize, y: &[f32], sum: f32x16<S>) -> f32x16<S> {
-        let tile = &self.tiles[at];
-        let mut even = f32x16::splat(simd, 0.0);
-        let mut odd = f32x16::splat(simd, 0.0);
-        for (pair, words) in tile.words.iter().enumerate() {
-            let word = i32x16::from_slice(simd, words);
-            let low: f32x16<S> = f32x16::float_from(word << 16);
-            let high: f32x16<S> = f32x16::float_from(word);
-            even += low * y[2 * pair];
-            odd += high * y[2 * pair + 1];
-        }
-        sum + (even + odd) * self.scales[at]
+    fn scales_of(&self, s: &Supernode, width: usize, height: usize) -> [Scales<'_>; 2] {
+        let (columns, rest) = self.scales[s.scales..s.scales + 3 * width + height].split_at(width);
+        let (rows, rest) = rest.split_at(width);
+        let (under, below) = rest.split_at(width);
+        [Scales { columns, rows }, Scales { columns: under, rows: below }]
     }
 
-    /// Sum over a column of tiles, the first of them at `at`, of tile' times its part of `x`.
-    #[inline(always)]
-    fn transposed<S: Simd>(&self, simd: S, at: usize, x: &[f32]) -> f32x16<S> {
-        let mut sums = [f32x16::splat(simd, 0.0); TILE_SIZE];
-        for (k, x) in x.chunks_exact(TILE_SIZE).enumerate() {
-            self.add_transposed(simd, at + k, x, &mut sums);
-        }
-        transpose_sum(simd, sums)
+    /// Whether a factor is always read with its remainders.
+    fn is_small(&self) -> bool {
+        self.tiles.len() <= MAX_SMALL
     }
 
-    /// Adds the products of a tile's columns with `x`, lane by lane; the caller needs their sums
-    /// over lanes.
+    /// Adds to `sums` the products of a column of tiles, the first of them at `at`, with `y` times
+    /// the columns' `scales`; without the rows' scales.
     #[inline(always)]
-    fn add_transposed<S: Simd>(&self, simd: S, at: usize, x: &[f32], sums: &mut [f32x16<S>; TILE_SIZE]) {
-        let x = f32x16::from_slice(simd, x) * self.scales[at];
-        for (pair, words) in self.tiles[at].words.iter().enumerate() {
-            let word = i32x16::from_slice(simd, words);
-            let low: f32x16<S> = f32x16::float_from(word << 16);
-            let high: f32x16<S> = f32x16::float_from(word);
-            sums[2 * pair] += low * x;
-            sums[2 * pair + 1] += high * x;
+    fn add_product<S: Simd>(
+        &self,
+        simd: S,
+        at: &mut usize,
+        y: &[f32],
+        scales: &[f32],
+        sums: &mut [f32],
+        precise: bool,
+    ) {
+        let (y, unit) = pairs(f32x16::from_slice(simd, y) * f32x16::from_slice(simd, scales));
+        let tiles = *at..*at + sums.len() / TILE_SIZE;
+        for (at, sum) in tiles.clone().zip(sums.chunks_exact_mut(TILE_SIZE)) {
+            let mut product: f32x16<S> = f32x16::float_from(self.tiles[at].product(simd, &y));
+            if precise {
+                let rest: f32x16<S> = f32x16::float_from(self.remainders[at].product(simd, &y));
+                product += rest * (1.0 / Tile::REMAINDER_UNIT);
+            }
+            (f32x16::from_slice(simd, sum) + product * unit).store_slice(sum);
         }
+        *at = tiles.end;
+    }
+
+    /// Sum over a column of tiles, the first of them at `at`, of tile' times its part of `x`, whole
+    /// numbers; without the columns' scales.
+    #[inline(always)]
+    fn transposed<S: Simd>(&self, simd: S, at: usize, x: &[f32], precise: bool) -> f32x16<S> {
+        let mut sum = sum_transposed(simd, &self.tiles[at..], x);
+        if precise {
+            sum += sum_transposed(simd, &self.remainders[at..], x) * (1.0 / Tile::REMAINDER_UNIT);
+        }
+        sum
     }
 }
 
-/// The sum over lanes of each of 16 vectors.
+/// Sum of tile' times its part of `x`, whole numbers, over as many `tiles` as `x` has parts.
 #[inline(always)]
-fn transpose_sum<S: Simd>(simd: S, mut v: [f32x16<S>; TILE_SIZE]) -> f32x16<S> {
-    // Each round adds neighbours and halves the number of vectors; unzipping keeps their order.
-    for half in [8, 4, 2, 1] {
-        for k in 0..half {
-            let (a, b) = (v[2 * k], v[2 * k + 1]);
-            v[k] = simd.unzip_low_f32x16(a, b) + simd.unzip_high_f32x16(a, b);
-        }
+fn sum_transposed<S: Simd>(simd: S, tiles: &[Tile], x: &[f32]) -> f32x16<S> {
+    let mut sums = [i32x16::splat(simd, 0); TILE_SIZE];
+    for (tile, x) in tiles.iter().zip(x.chunks_exact(TILE_SIZE)) {
+        tile.add_transposed(simd, i32x16::truncate_from(f32x16::from_slice(simd, x)), &mut sums);
     }
-    v[0]
+    transpose_sum(simd, &sums)
+}
+
+/// The scales of a block's columns and rows.
+struct Scales<'a> {
+    columns: &'a [f32],
+    rows: &'a [f32],
+}
+
+/// Multiplies number by number.
+#[inline(always)]
+fn multiply<S: Simd>(simd: S, x: &mut [f32], by: &[f32]) {
+    for (x, by) in x.chunks_exact_mut(TILE_SIZE).zip(by.chunks_exact(TILE_SIZE)) {
+        (f32x16::from_slice(simd, x) * f32x16::from_slice(simd, by)).store_slice(x);
+    }
 }
