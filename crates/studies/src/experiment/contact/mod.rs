@@ -6,14 +6,14 @@ mod result;
 mod scene;
 mod theory;
 
-pub use result::{BodyRow, ContactResult, DragRow, FineRow, SphereRow};
+pub use result::{BodyRow, ContactResult, DragRow, SceneRow, SphereRow};
 
 use crate::Result;
 use crate::scenes::{FRAME, reference};
 use crate::study::{Job, Kind, Study};
 use clap::Args;
 use glam::DVec3;
-use scene::{THICKNESS, WIDTH};
+use scene::{Base, THICKNESS, WIDTH};
 use trocar_core::{Pose, Progress};
 use trocar_report::document::Document;
 use trocar_tissue::{Grasp, Material, Model, Shape, SolverSettings, State, Stepper, ToolContact, ToolMotion};
@@ -42,20 +42,29 @@ const PARTS: u32 = 4;
 /// Contact that gives way by next to nothing, over the model's.
 const STIFF: f64 = 50.0;
 
-/// A contact's force by the fast solver beside the oracle's on the same mesh, and beside Hertz.
+/// A contact's force by the fast solver beside the oracle's on the same mesh, and of a scene's tissue
+/// beside Hertz.
 #[derive(Clone, Debug, Args)]
 pub struct ContactExperiment {
     /// Elements over the thickness of the layer (8 mm); 2, 4 and 6 by default.
     #[arg(long = "cells", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=16))]
     pub cells: Vec<u16>,
-    /// Elements over the thickness of finer layers, which the fast solver alone presses on.
+    /// Elements over the thickness of layers of a scene's tissue, which the default solver presses
+    /// on.
     #[arg(long, value_name = "CELLS", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=16),
-          default_values_t = [10, 12, 13, 14, 16])]
-    pub finer: Vec<u16>,
+          default_values_t = [8, 10, 12, 14])]
+    pub scene_cells: Vec<u16>,
+    /// Cells of the lattice over the thickness of these layers.
+    #[arg(long, value_name = "CELLS", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=16),
+          default_values_t = [6, 8, 10])]
+    pub lattice_cells: Vec<u16>,
+    /// Poisson's ratios of these layers.
+    #[arg(long, value_name = "RATIOS", value_delimiter = ',', default_values_t = [0.3, 0.45, 0.49, 0.499])]
+    pub scene_ratios: Vec<f64>,
     /// Young's modulus (Pa).
     #[arg(long, default_value_t = 5e3)]
     pub young_modulus: f64,
-    /// Poisson's ratio. Linear elements of tissue that keeps its volume are too stiff.
+    /// Poisson's ratio beside the oracle.
     #[arg(long, default_value_t = 0.3)]
     pub poisson_ratio: f64,
     /// Depth of the sphere (mm).
@@ -69,7 +78,7 @@ pub struct ContactExperiment {
 impl Study for ContactExperiment {
     const NAME: &'static str = "contact";
     const KIND: Kind = Kind::Experiment;
-    const SCHEMA: u32 = 2;
+    const SCHEMA: u32 = 3;
     type Figures = ContactResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(ContactResult, Document)> {
@@ -95,12 +104,13 @@ impl Study for ContactExperiment {
             radius_mm: 1e3 * RADIUS,
             depth_mm: self.depth_mm,
             spheres: Vec::new(),
-            fine: Vec::new(),
+            scenes: Vec::new(),
             drags: Vec::new(),
             bodies: Vec::new(),
         };
         let material = scene::material(self.young_modulus, self.poisson_ratio);
-        let pressed = cells.len() + self.finer.len() + coarse.len();
+        let layers = self.scene_ratios.len() * (self.scene_cells.len() + self.lattice_cells.len());
+        let pressed = cells.len() + layers + coarse.len();
         job.progress.begin("contact", (modes.len() * pressed + cells.len()) as u64);
         for mode in modes {
             for cells in &cells {
@@ -108,10 +118,13 @@ impl Study for ContactExperiment {
                 job.progress.advance(1);
             }
         }
-        for mode in modes {
-            for cells in &self.finer {
-                result.fine.push(self.fine(usize::from(*cells), material, mode, job.progress)?);
-                job.progress.advance(1);
+        let backends = [(Base::Tetrahedra, &self.scene_cells), (Base::Lattice, &self.lattice_cells)];
+        for ratio in &self.scene_ratios {
+            for (base, list) in backends {
+                for (mode, cells) in modes.iter().flat_map(|mode| list.iter().map(move |cells| (*mode, *cells))) {
+                    result.scenes.push(self.scene(base, usize::from(cells), *ratio, mode, job.progress)?);
+                    job.progress.advance(1);
+                }
             }
         }
         for mode in modes {
@@ -210,7 +223,8 @@ impl ContactExperiment {
         mode: ToolContact,
         progress: &dyn Progress,
     ) -> Result<SphereRow> {
-        let Pressed { model, state, touching, force_n, overlap_mm } = self.pressed(cells, material, mode, progress)?;
+        let layer = self.layer(cells, material, mode, 1.0)?;
+        let Pressed { model, state, touching, force_n, overlap_mm } = self.pressed(layer, cells, progress)?;
         let settled = |model: &Model| -> Result<(f64, OracleState)> {
             let (mut oracle, mut exact) = (Oracle::new(model), OracleState::new(model));
             for part in 1..=PARTS {
@@ -223,7 +237,7 @@ impl ContactExperiment {
         let (truth, exact) = settled(&model)?;
         // Some states of stiff contact have no minimum that Newton's method finds.
         let stiff = settled(&self.layer(cells, material, mode, STIFF)?).ok().map(|(force, _)| force);
-        let [hertz_n, layer_n] = self.theory();
+        let [hertz_n, layer_n] = self.theory(self.poisson_ratio);
         Ok(SphereRow {
             tool_contact: name(mode),
             cells,
@@ -241,10 +255,26 @@ impl ContactExperiment {
         })
     }
 
-    fn fine(&self, cells: usize, material: Material, mode: ToolContact, progress: &dyn Progress) -> Result<FineRow> {
-        let Pressed { model, touching, force_n, overlap_mm, .. } = self.pressed(cells, material, mode, progress)?;
-        let [_, layer_n] = self.theory();
-        Ok(FineRow {
+    /// A layer with the tissue that a scene gives an organ of this ratio.
+    fn scene(
+        &self,
+        base: Base,
+        cells: usize,
+        ratio: f64,
+        mode: ToolContact,
+        progress: &dyn Progress,
+    ) -> Result<SceneRow> {
+        let own = scene::material(self.young_modulus, ratio);
+        let material = match base {
+            Base::Tetrahedra => trocar_cell::element_material(own, &scene::mesh(cells)),
+            Base::Lattice => own,
+        };
+        let layer = scene::layer(base, cells, material, self.shape(cells), 0.0, mode, 1.0)?;
+        let Pressed { model, touching, force_n, overlap_mm, .. } = self.pressed(layer, cells, progress)?;
+        let [_, layer_n] = self.theory(ratio);
+        Ok(SceneRow {
+            poisson_ratio: ratio,
+            backend: base.name().to_owned(),
             tool_contact: name(mode),
             edge_mm: 1e3 * THICKNESS / cells as f64,
             nodes: model.bodies()[0].len(),
@@ -257,10 +287,10 @@ impl ContactExperiment {
     }
 
     /// Forces of a half-space and of the layer (N).
-    fn theory(&self) -> [f64; 2] {
+    fn theory(&self, ratio: f64) -> [f64; 2] {
         let depth = 1e-3 * self.depth_mm;
-        let hertz = theory::hertz(self.young_modulus, self.poisson_ratio, RADIUS, depth);
-        [hertz, hertz * theory::layer_over_half_space(self.poisson_ratio, RADIUS, depth, THICKNESS)]
+        let hertz = theory::hertz(self.young_modulus, ratio, RADIUS, depth);
+        [hertz, hertz * theory::layer_over_half_space(ratio, RADIUS, depth, THICKNESS)]
     }
 
     /// The sphere's pose at a share of its way down.
@@ -269,11 +299,15 @@ impl ContactExperiment {
     }
 
     fn layer(&self, cells: usize, material: Material, mode: ToolContact, stiffer: f64) -> Result<Model> {
-        scene::layer(cells, material, Shape::Sphere { centre: middle(cells), radius: RADIUS }, 0.0, mode, stiffer)
+        scene::layer(Base::Tetrahedra, cells, material, self.shape(cells), 0.0, mode, stiffer)
     }
 
-    fn pressed(&self, cells: usize, material: Material, mode: ToolContact, progress: &dyn Progress) -> Result<Pressed> {
-        let model = self.layer(cells, material, mode, 1.0)?;
+    /// The sphere, over the middle of a layer.
+    fn shape(&self, cells: usize) -> Shape {
+        Shape::Sphere { centre: middle(cells), radius: RADIUS }
+    }
+
+    fn pressed(&self, model: Model, cells: usize, progress: &dyn Progress) -> Result<Pressed> {
         let mut state = State::new(&model);
         let stepper = stepped(&model, &mut state, DOWN + REST, |k| self.lowered(down(k)), progress)?;
         let force = stepper.forces()[0];
@@ -288,7 +322,7 @@ impl ContactExperiment {
         let half = DVec3::new(0.2e-3, 4.75e-3, 0.0);
         let ends = [middle(cells) - half, middle(cells) + half].map(|p| p - DVec3::X * 3.5e-3);
         let shape = Shape::Capsule { ends, radius: CAPSULE_RADIUS };
-        let model = scene::layer(cells, material, shape, FRICTION, mode, 1.0)?;
+        let model = scene::layer(Base::Tetrahedra, cells, material, shape, FRICTION, mode, 1.0)?;
         let step = 1e-3 * self.speed_mm_s * FRAME;
         let place = |t: f64| {
             let pressed = f64::from(DOWN) * 0.5;

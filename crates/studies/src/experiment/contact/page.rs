@@ -12,7 +12,7 @@ const MAX_ERROR_DRAGGED: f64 = 0.04;
 pub(super) fn document(r: &ContactResult) -> Document {
     Document::new("Contact", "Contact beside the oracle and Hertz")
         .with(spheres(r))
-        .with(fine(r))
+        .with(scenes(r))
         .with(drags(r))
         .with(bodies(r))
 }
@@ -58,11 +58,14 @@ fn spheres(r: &ContactResult) -> Section {
     Section::new("A pressed sphere", lead).cards(cards).table(table)
 }
 
-fn fine(r: &ContactResult) -> Section {
-    let lead = "The fast solver on finer meshes, beside Hertz's force for the layer.";
+fn scenes(r: &ContactResult) -> Section {
+    let lead = "The same layer with the tissue that a scene gives an organ, beside Hertz's force for the layer: \
+                tetrahedra with mesh_correction, and the lattice with cells as large as the edges.";
     let table = Table::of(
-        &r.fine,
+        &r.scenes,
         &[
+            ("Poisson's ratio", &|row| fixed(row.poisson_ratio, 3)),
+            ("Backend", &|row| row.backend.clone()),
             ("Contact", &|row| row.tool_contact.clone()),
             ("Edge (mm)", &|row| fixed(row.edge_mm, 2)),
             ("Nodes", &|row| count(row.nodes)),
@@ -73,7 +76,7 @@ fn fine(r: &ContactResult) -> Section {
             ("Over the layer's", &|row| percent(row.layer_error, 1)),
         ],
     );
-    Section::new("Finer meshes", lead).table(table)
+    Section::new("Tissue of a scene", lead).table(table)
 }
 
 fn drags(r: &ContactResult) -> Section {

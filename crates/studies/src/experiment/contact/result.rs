@@ -33,9 +33,13 @@ pub struct SphereRow {
     pub layer_n: f64,
 }
 
-/// A sphere pressed into a finer layer by the fast solver.
+/// A sphere pressed into a layer of a scene's tissue.
 #[derive(Clone, Debug, Serialize)]
-pub struct FineRow {
+pub struct SceneRow {
+    /// Poisson's ratio of the organ.
+    pub poisson_ratio: f64,
+    /// `tetrahedra`, with the material that `mesh_correction` gives them, or `lattice`.
+    pub backend: String,
     /// What touches: `vertices` or `surface`.
     pub tool_contact: String,
     /// Edge of the triangles (mm).
@@ -103,8 +107,8 @@ pub struct ContactResult {
     pub depth_mm: f64,
     /// Spheres.
     pub spheres: Vec<SphereRow>,
-    /// Spheres in finer layers.
-    pub fine: Vec<FineRow>,
+    /// Spheres in layers of a scene's tissue.
+    pub scenes: Vec<SceneRow>,
     /// Capsules.
     pub drags: Vec<DragRow>,
     /// Bodies.

@@ -3,7 +3,28 @@
 use crate::{Result, scenes};
 use glam::DVec3;
 use trocar_geometry::TetMesh;
-use trocar_tissue::{BodyContact, BodyDescription, Collider, Material, Model, ModelBuilder, Shape, ToolContact};
+use trocar_tissue::{
+    Backend, BodyContact, BodyDescription, Collider, LatticeSettings, Material, Model, ModelBuilder, Shape, ToolContact,
+};
+
+/// What bears the layer.
+#[derive(Clone, Copy, Debug)]
+pub enum Base {
+    /// Its tetrahedra.
+    Tetrahedra,
+    /// A lattice with cells as large as the tetrahedra's cubes.
+    Lattice,
+}
+
+impl Base {
+    /// The name in a scene file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tetrahedra => "tetrahedra",
+            Self::Lattice => "lattice",
+        }
+    }
+}
 
 /// The layer's width and thickness (m).
 pub const WIDTH: f64 = 24e-3;
@@ -28,6 +49,7 @@ pub fn material(young_modulus: f64, poisson_ratio: f64) -> Material {
 /// # Errors
 /// Material or tool out of range.
 pub fn layer(
+    base: Base,
     cells: usize,
     material: Material,
     shape: Shape,
@@ -36,7 +58,12 @@ pub fn layer(
     stiffer: f64,
 ) -> Result<Model> {
     let builder = ModelBuilder::new().gravity(DVec3::ZERO).tool_contact(mode);
-    let mut builder = builder.contact_stiffness(CONTACT_STIFFNESS * stiffer);
+    let mut builder = builder.contact_stiffness(CONTACT_STIFFNESS * stiffer).backend(match base {
+        Base::Tetrahedra => Backend::Tetrahedra,
+        Base::Lattice => {
+            Backend::Lattice(LatticeSettings { cell: THICKNESS / cells as f64, ..LatticeSettings::default() })
+        }
+    });
     add_layer(&mut builder, cells, material)?;
     builder.collider(Collider { name: "tool".to_owned(), tool: 0, shape, rest_offset: 0.0, friction })?;
     Ok(builder.build()?)
@@ -65,10 +92,15 @@ pub fn two_bodies(cells: usize, material: Material) -> Result<(Model, Vec<u32>)>
 /// The builder's default, over Young's modulus times a node's size.
 const CONTACT_STIFFNESS: f64 = 20.0;
 
-fn add_layer(builder: &mut ModelBuilder, cells: usize, material: Material) -> Result<()> {
+/// The layer's mesh.
+pub fn mesh(cells: usize) -> TetMesh {
     let edge = THICKNESS / cells as f64;
     let across = (WIDTH / edge).round() as usize;
-    let mesh = block([across, across, cells], edge);
+    block([across, across, cells], edge)
+}
+
+fn add_layer(builder: &mut ModelBuilder, cells: usize, material: Material) -> Result<()> {
+    let mesh = mesh(cells);
     let pinned = (0..mesh.vertices.len() as u32).filter(|i| mesh.vertices[*i as usize].z == 0.0).collect();
     let name = "layer".to_owned();
     builder.body(BodyDescription { name, mesh: &mesh, material, pinned, supports: Vec::new() })?;
