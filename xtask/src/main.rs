@@ -3,6 +3,7 @@
 
 #![allow(clippy::print_stderr, reason = "this is a command-line program")]
 
+mod aarch64;
 mod columns;
 mod figures;
 mod package;
@@ -39,6 +40,7 @@ const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests, 
        cargo xtask tools         fetch the programs and libraries that some tests compare with (test does this too)
        cargo xtask peers         our stepping beside Newton and MuJoCo on one mesh (peers from PyPI; scripts from ../shared/peers)
        cargo xtask figures [NAME...]  run studies and write their tables into docs/generated; all that are there by default
+       cargo xtask aarch64       the same bits on 64-bit ARM, in an emulator (skipped without qemu and a cross-compiler)
        cargo xtask fuzz [CASES]  damaged files against every reader, a million cases by default";
 
 fn main() -> ExitCode {
@@ -58,6 +60,7 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         ["figures", names @ ..] => code(told(&figures::run(names))),
+        ["aarch64"] => code(told(&aarch64::check())),
         ["peers"] => code(told(&peers::run())),
         ["fuzz"] => fuzz(1_000_000),
         ["fuzz", cases] => match cases.parse() {

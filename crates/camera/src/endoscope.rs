@@ -33,7 +33,7 @@ impl Endoscope {
     /// paper's endoscope after undistortion.
     pub fn thirty_degrees() -> Self {
         let (width, height) = (1280, 720);
-        let focal = |pixels: usize, deg: f64| 0.5 * pixels as f64 / (0.5 * deg.to_radians()).tan();
+        let focal = |pixels: usize, deg: f64| 0.5 * pixels as f64 / libm::tan(0.5 * deg.to_radians());
         let centred = Camera::centred(width, height, 86.2_f64.to_radians());
         let camera = Camera { fy: focal(height, 54.6), ..centred };
         Self { camera, oblique: 30.0_f64.to_radians(), turn: 0.0 }

@@ -59,7 +59,7 @@ impl CameraModel {
             Self::Pinhole(camera) => camera.project(p),
             Self::Fisheye(camera, lens) => {
                 let aside = p.truncate();
-                let angle = aside.length().atan2(p.z);
+                let angle = libm::atan2(aside.length(), p.z);
                 if aside == DVec2::ZERO && p.z <= 0.0 {
                     return None;
                 }
@@ -77,7 +77,7 @@ impl CameraModel {
         match self {
             Self::Pinhole(camera) => Some(camera.distortion.invert(q)?.extend(1.0).normalize()),
             Self::Fisheye(_, lens) => {
-                let (sin, cos) = lens.invert(q.length())?.sin_cos();
+                let (sin, cos) = libm::sincos(lens.invert(q.length())?);
                 Some((q.normalize_or_zero() * sin).extend(cos))
             }
         }

@@ -15,6 +15,8 @@
 //! # Ok::<(), trocar_camera::Error>(())
 //! ```
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, reason = "the same bits on every processor"))]
+
 mod calibration;
 mod depth_noise;
 mod distortion;

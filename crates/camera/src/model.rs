@@ -40,7 +40,7 @@ impl Camera {
     /// A camera with square pixels, a horizontal field of view of `width_rad` (rad), a centred
     /// principal point and no distortion.
     pub fn centred(width: usize, height: usize, width_rad: f64) -> Self {
-        let f = width as f64 / 2.0 / (width_rad / 2.0).tan();
+        let f = width as f64 / 2.0 / libm::tan(width_rad / 2.0);
         Self {
             width,
             height,

@@ -161,7 +161,7 @@ impl Bite {
 
 /// Gap between the edges at station `k` (m), with the blades at `angle` (rad).
 fn gap(k: usize, angle: f64) -> f64 {
-    2.0 * place(k) * (0.5 * angle).tan()
+    2.0 * place(k) * libm::tan(0.5 * angle)
 }
 
 #[cfg(test)]

@@ -60,7 +60,7 @@ impl Gripper {
 
     /// Half the gap between the blades at distance `r` from the pivot (m).
     pub fn half_gap(&self, r: f64) -> f64 {
-        r * (0.5 * self.jaw_angle).sin()
+        r * libm::sin(0.5 * self.jaw_angle)
     }
 
     /// Surface of the shaft and the two blades in the world (m), for pictures.
@@ -85,7 +85,7 @@ impl Gripper {
         let circle = |x: f64, radius: f64| -> [DVec3; SIDES] {
             std::array::from_fn(|k| {
                 let a = std::f64::consts::TAU * k as f64 / SIDES as f64;
-                DVec3::new(x, radius * a.cos(), radius * a.sin())
+                DVec3::new(x, radius * libm::cos(a), radius * libm::sin(a))
             })
         };
         let shaft =

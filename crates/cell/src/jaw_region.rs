@@ -70,7 +70,7 @@ impl JawRegion {
 
     /// The same in the gripper's frame, with the blades farther apart by `beyond` (m) on each side.
     fn holds(&self, q: DVec3, beyond: f64) -> bool {
-        let r = q.x.hypot(q.y);
+        let r = libm::hypot(q.x, q.y);
         let along = q.x > 0.0 && (JAW_REGION_BEGIN..=self.length).contains(&r);
         along && q.z.abs() <= 0.5 * BLADE_WIDTH && q.y.abs() <= self.gripper.half_gap(r) + beyond
     }
@@ -145,7 +145,7 @@ impl JawRegion {
         }
         let centroid = sum / volume;
         let q = self.to_gripper.transform(centroid);
-        let gap = 2.0 * self.gripper.half_gap(q.x.hypot(q.y));
+        let gap = 2.0 * self.gripper.half_gap(libm::hypot(q.x, q.y));
         (gap > CONTACT_SKIN).then_some(TissueInJaws { centroid, volume, gap })
     }
 

@@ -4,6 +4,8 @@
 //! in the cell frame: it takes actions and reports observations. Its arms are driven by their
 //! dynamics through ports, where tissue loads them, or are ideal and go where they are commanded.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, reason = "the same bits on every processor"))]
+
 mod bite;
 pub mod blades;
 mod cell;

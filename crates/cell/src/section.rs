@@ -38,7 +38,7 @@ pub(crate) fn chords(world: &World, organ: usize, gripper: &Gripper, length: f64
     let body = &world.model.bodies()[organ];
     let places = world.state.positions(&world.model, organ);
     let places: Vec<DVec3> = places.into_iter().map(|p| to_gripper.transform(p)).collect();
-    let slope = (0.5 * gripper.jaw_angle).tan();
+    let slope = libm::tan(0.5 * gripper.jaw_angle);
     let mut chords = vec![Chord::default(); count(length)];
     for tet in body.tets() {
         let corners = tet.map(|i| places[i as usize]);

@@ -7,6 +7,8 @@
 //! - [`Progress`]: how long work reports its progress and learns that it should stop.
 //! - [`thread_pool`]: worker threads, as many as a machine bears; [`has_threads`].
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, reason = "the same bits on every processor"))]
+
 pub mod interpolate;
 mod pose;
 mod progress;

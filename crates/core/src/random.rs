@@ -22,7 +22,7 @@ pub fn unit(bits: u64) -> f64 {
 /// A number of the standard normal distribution from two independent uniform numbers in [0, 1)
 /// (G. E. P. Box, M. E. Muller, 1958).
 pub fn standard_normal(a: f64, b: f64) -> f64 {
-    (-2.0 * (1.0 - a).ln()).sqrt() * (TAU * b).cos()
+    (-2.0 * libm::log(1.0 - a)).sqrt() * libm::cos(TAU * b)
 }
 
 /// A counter-based generator: a key, whose numbers are addressed by index.

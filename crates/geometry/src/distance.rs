@@ -233,7 +233,7 @@ fn triangle_solid_angle(triangle: &[DVec3; 3], p: DVec3) -> f64 {
     let (la, lb, lc) = (a.length(), b.length(), c.length());
     let numerator = a.dot(b.cross(c));
     let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-    2.0 * numerator.atan2(denominator)
+    2.0 * libm::atan2(numerator, denominator)
 }
 
 /// The point of a triangle nearest to `p` (m), by the Voronoi region that contains `p` (Ericson

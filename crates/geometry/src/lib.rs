@@ -25,6 +25,8 @@
 //! # Ok::<(), trocar_geometry::Error>(())
 //! ```
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, reason = "the same bits on every processor"))]
+
 mod axis;
 mod distance;
 mod error;

@@ -64,7 +64,7 @@ pub(crate) fn dihedral_angles(corners: &[DVec3; 4]) -> [f64; 6] {
         let m = along.cross(corners[k] - corners[i]);
         let n = along.cross(corners[l] - corners[i]);
         // atan2 keeps full precision near 0 and pi, where the arc cosine loses half of its digits.
-        m.cross(n).length().atan2(m.dot(n))
+        libm::atan2(m.cross(n).length(), m.dot(n))
     })
 }
 

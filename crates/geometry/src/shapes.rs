@@ -52,7 +52,7 @@ pub(crate) struct Torus(pub f64, pub f64);
 
 impl SignedDistance for Torus {
     fn distance(&self, p: DVec3) -> f64 {
-        (p.x.hypot(p.y) - self.0).hypot(p.z) - self.1
+        libm::hypot(libm::hypot(p.x, p.y) - self.0, p.z) - self.1
     }
 }
 

@@ -141,7 +141,7 @@ impl Grid {
 
 /// More cells than can be solved.
 pub(crate) fn too_many(cell: f64, cells: f64) -> Error {
-    let right = 1e3 * cell * (cells / MAX_CELLS as f64).cbrt() * 1.05;
+    let right = 1e3 * cell * libm::cbrt(cells / MAX_CELLS as f64) * 1.05;
     let cell = 1e3 * cell;
     Error::Lattice(format!(
         "cells of {cell} mm are {cells:.0} in number; must be at most {MAX_CELLS}: choose a cell of {right:.2} mm or \

@@ -83,7 +83,7 @@ impl Bed {
         let mut p = DVec3::new(x, y, smooth - lobe - 4e-3 * scale * (folds - 0.3).max(0.0));
         // The sheet climbs slightly at an organ, where it is attached.
         let beside = self.organs.iter().map(|o| o.distance(p)).fold(f64::INFINITY, f64::min);
-        p.z -= CLIMB * scale * (-beside.max(0.0) / (CLIMB_REACH * scale)).exp();
+        p.z -= CLIMB * scale * libm::exp(-beside.max(0.0) / (CLIMB_REACH * scale));
         // Descend until clear of every organ. A minimum step lets a column through an organ pass
         // below it.
         for _ in 0..400 {

@@ -104,7 +104,7 @@ impl Blend {
                 if d.length() - radius < nearest {
                     nearest = d.length() - radius;
                     let across = DVec3::Z.cross(tangent).normalize_or(DVec3::Y);
-                    let angle = d.dot(across.cross(tangent)).atan2(d.dot(across));
+                    let angle = libm::atan2(d.dot(across.cross(tangent)), d.dot(across));
                     local = Some(LocalPoint { s: (before + along) / total, angle });
                 }
             }
@@ -115,7 +115,7 @@ impl Blend {
             let s = (p - self.base()).dot(axis) / axis.length_squared();
             let d = p - self.base() - axis * s;
             let across = DVec3::Z.cross(axis).normalize_or(DVec3::Y);
-            LocalPoint { s: s.clamp(0.0, 1.0), angle: (-d.z).atan2(d.dot(across)) }
+            LocalPoint { s: s.clamp(0.0, 1.0), angle: libm::atan2(-d.z, d.dot(across)) }
         })
     }
 
@@ -177,7 +177,7 @@ impl Part {
             Self::Strand { line, radius, folds: (depth, distance), seed } => {
                 let (along, foot, _) = foot(line, p);
                 let uneven = 0.07 * noise::smooth(*seed, DVec3::new(along / 0.012, 0.5, 0.5));
-                let fold = (std::f64::consts::PI * along / distance).cos().powi(6);
+                let fold = libm::cos(std::f64::consts::PI * along / distance).powi(6);
                 (p - foot).length() - radius * (1.0 + uneven + 0.35 * depth - depth * fold)
             }
         }

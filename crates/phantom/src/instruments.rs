@@ -59,7 +59,7 @@ pub(crate) fn pair(reach: &InstrumentMotion, phase: f64) -> [Instrument; 2] {
 impl Instrument {
     /// Surface of the instrument at `time` (s), in the camera frame.
     pub fn mesh(&self, time: f64) -> TriMesh {
-        let swing = |p: f64, phase: f64| (TAU * time / p + phase).sin();
+        let swing = |p: f64, phase: f64| libm::sin(TAU * time / p + phase);
         let offset = DVec3::new(
             swing(self.period.x, self.phase.x),
             swing(self.period.y, self.phase.y),
@@ -90,7 +90,8 @@ impl Posture {
         let Self { scale, port, tip, roll, opening } = *self;
         let x = (tip - port).normalize();
         let y = DVec3::Z.cross(x).normalize();
-        let (y, z) = (y * roll.cos() + x.cross(y) * roll.sin(), x.cross(y) * roll.cos() - y * roll.sin());
+        let (y, z) =
+            (y * libm::cos(roll) + x.cross(y) * libm::sin(roll), x.cross(y) * libm::cos(roll) - y * libm::sin(roll));
         let turn = DMat3::from_cols(x, y, z);
 
         let mut mesh = TriMesh::default();
@@ -110,13 +111,13 @@ impl Posture {
                 .map(|(x, r)| round(hinge + x * 1e-3, r * 1e-3));
         loft(&mut mesh, &wrist, steel);
         for side in [-1.0, 1.0] {
-            let (sin, cos) = (side * opening / 2.0_f64).sin_cos();
+            let (sin, cos) = libm::sincos(side * opening / 2.0_f64);
             let rings: Vec<_> = (0..=12)
                 .map(|i| {
                     let s = f64::from(i) / 12.0;
                     // Blunt at the tip, slightly bowed outwards.
                     let blunt = (1.0 - (s - 0.75).max(0.0).powi(2) / 0.0625).max(0.0).sqrt().max(0.15);
-                    let (along, out) = (s * JAW_LENGTH, side * (0.75e-3 + 0.7e-3 * (PI * s).sin()));
+                    let (along, out) = (s * JAW_LENGTH, side * (0.75e-3 + 0.7e-3 * libm::sin(PI * s)));
                     let centre = DVec3::new(hinge + along * cos - out * sin, along * sin + out * cos, 0.0);
                     (centre, (1.0e-3 - 0.25e-3 * s) * blunt, (1.9e-3 - 0.6e-3 * s) * blunt)
                 })
@@ -136,7 +137,7 @@ fn loft(mesh: &mut TriMesh, rings: &[(DVec3, f64, f64)], color: [u8; 3]) {
     let sides = SIDES as u32;
     for (centre, ry, rz) in rings {
         for j in 0..SIDES {
-            let (sin, cos) = (TAU * j as f64 / SIDES as f64).sin_cos();
+            let (sin, cos) = libm::sincos(TAU * j as f64 / SIDES as f64);
             mesh.vertices.push(*centre + DVec3::new(0.0, ry * cos, rz * sin));
         }
     }

@@ -15,6 +15,8 @@
 //! # Ok::<(), trocar_phantom::Error>(())
 //! ```
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, reason = "the same bits on every processor"))]
+
 mod anatomy;
 mod bed;
 mod blend;

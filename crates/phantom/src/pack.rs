@@ -90,7 +90,7 @@ pub(crate) fn pack(items: impl IntoIterator<Item = OrganPlacement>, seed: u64, b
 fn slide(item: &OrganPlacement, seed: u64, bed: &Bed, organs: &[Organ]) -> Body {
     const START: f64 = 0.12;
     const STEPS: usize = 200;
-    let (sin, cos) = item.slide_deg.to_radians().sin_cos();
+    let (sin, cos) = libm::sincos(item.slide_deg.to_radians());
     let at = |along: f64| {
         let base = (item.base.0 * 1e-3 + along * cos, item.base.1 * 1e-3 + along * sin);
         let heading = item.heading_deg.to_radians();
@@ -122,7 +122,7 @@ impl Coil {
     fn lay(&self, seed: u64, base: (f64, f64), heading: f64, bed: &Bed) -> Blend {
         const POINTS: usize = 25;
         let Self { runs, width, radius, pitch } = *self;
-        let (sin, cos) = heading.sin_cos();
+        let (sin, cos) = libm::sincos(heading);
         let vary = |k: u64| 2.0 * noise::unit(noise::key(&[seed, 50 + k])) - 1.0;
         let place = |x: f64, y: f64, level: f64| {
             let (x, y) = (base.0 + x * cos - y * sin, base.1 + x * sin + y * cos);
@@ -153,7 +153,7 @@ impl Coil {
                     let turning = |t: f64| 0.45 * pitch * ((t - 0.62).max(0.0) / 0.38).powi(2);
                     let after = if row + 1 < rows { turning(t) } else { 0.0 };
                     let before = if row > 0 { turning(-t) } else { 0.0 };
-                    let wave = 0.10 * (3.0 * t + vary(40 + k)).sin();
+                    let wave = 0.10 * libm::sin(3.0 * t + vary(40 + k));
                     place(forward * t * half + shift, y + bow + after - before, level + wave)
                 })
                 .collect();
@@ -163,7 +163,7 @@ impl Coil {
         let line = (0..2 * POINTS)
             .map(|i| {
                 let t = 2.0 * i as f64 / (2 * POINTS - 1) as f64 - 1.0;
-                let (x, y) = (0.26 * width * (2.4 * t).sin(), 0.22 * pitch * runs as f64 * t);
+                let (x, y) = (0.26 * width * libm::sin(2.4 * t), 0.22 * pitch * runs as f64 * t);
                 place(x, y, 2.55 - 0.5 * t * t)
             })
             .collect();

@@ -58,7 +58,7 @@ fn bowel_color(organ: &Organ, p: DVec3, [base, flush]: [DVec3; 2], vessels: Vess
     let mut color = base.lerp(flush, patches.clamp(0.0, 1.0));
     color *= 1.0 + 0.09 * fractal(seed + 2, p / 2e-3, 2);
     // Fat lies on the side of the mesentery.
-    let fat = fractal(seed + 3, p / 5e-3, 3) + 0.1 - 0.8 * local.angle.sin();
+    let fat = fractal(seed + 3, p / 5e-3, 3) + 0.1 - 0.8 * libm::sin(local.angle);
     color = color.lerp(FAT, 0.8 * step(0.0, 0.25, fat));
     let vessels = match vessels {
         Vessels::Network => network(seed + 4, p, 11e-3, 0.95e-3).max(0.7 * network(seed + 5, p, 5e-3, 0.6e-3)),
@@ -142,13 +142,13 @@ fn network(seed: u64, p: DVec3, size: f64, width: f64) -> f64 {
 /// Vessels that climb around a bowel from its mesenteric side, branch and taper.
 fn rungs(seed: u64, along: f64, angle: f64, p: DVec3) -> f64 {
     // Position on the wall: 0 at the mesentery, 1 on top.
-    let up = 0.5 + 0.5 * angle.sin();
+    let up = 0.5 + 0.5 * libm::sin(angle);
     let phase = along / 5.5e-3 + 0.45 * fractal(seed, p / 4e-3, 3);
     let fork = if up > 0.72 { 2.0 } else { 1.0 };
     let to_line = |phase: f64| (phase - phase.round()).abs();
     let spread = (fork - 1.0) * (0.25 - 0.8 * (up - 0.72)).max(0.0);
     let distance = to_line(phase - spread).min(to_line(phase + spread)) * 5.5e-3;
-    let rung = smooth(seed + 9, DVec3::new(phase.round() * 1.7, 0.5, f64::from(angle.cos() > 0.0) * 3.0));
+    let rung = smooth(seed + 9, DVec3::new(phase.round() * 1.7, 0.5, f64::from(libm::cos(angle) > 0.0) * 3.0));
     let reach = 0.75 + 0.35 * rung;
     let width = 0.62e-3 * (1.3 - up);
     (1.0 - step(0.5 * width, 1.6 * width, distance)) * (1.0 - step(reach - 0.15, reach, up))

@@ -83,7 +83,7 @@ fn organs(seed: u64, bed: &Bed) -> Vec<Organ> {
     for _ in 0..3 {
         let gallbladder = gallbladder(seeds[1], scale, &liver(seeds[0], scale, bed, None), bed);
         let carved = Body::Blend(liver(seeds[0], scale, bed, Some(gallbladder)));
-        scale *= (LIVER_VOLUME / carved.volume(4e-3)).cbrt();
+        scale *= libm::cbrt(LIVER_VOLUME / carved.volume(4e-3));
     }
     let gallbladder = gallbladder(seeds[1], scale, &liver(seeds[0], scale, bed, None), bed);
     let liver = liver(seeds[0], scale, bed, Some(gallbladder.clone()));
@@ -145,7 +145,7 @@ fn gallbladder(seed: u64, scale: f64, liver: &Blend, bed: &Bed) -> Tube {
     let shape = shape(76.0, 6.4, 6.1, 2.2, 0.34, (0.02, 30.0), [0.35 + vary(0, 0.1), -0.5 + vary(1, 0.1)]);
     let neck = (NECK.0 * scale * 1e-3, NECK.1 * scale * 1e-3);
     let heading = (84.0 + vary(2, 4.0)).to_radians();
-    let (sin, cos) = heading.sin_cos();
+    let (sin, cos) = libm::sincos(heading);
     let start = face(liver, neck.0, neck.1, bed) + 1.5e-3;
     let end = bed.smooth_height(neck.0 + shape.length * cos, neck.1 + shape.length * sin) - 20e-3;
     Tube::lay(shape, seed, neck, heading, |x, y| {

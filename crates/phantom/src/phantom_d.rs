@@ -142,7 +142,7 @@ fn gallbladder(seed: u64, bed: &Bed) -> Tube {
         neck,
         |s| start - turned * ((s - TURN.0) / (TURN.1 - TURN.0)).clamp(0.0, 1.0),
         |s, x, y| {
-            let radius = shape.high * (1.0 + (shape.taper - 1.0) * s) * (1.0 + shape.bulge * (PI * s).sin());
+            let radius = shape.high * (1.0 + (shape.taper - 1.0) * s) * (1.0 + shape.bulge * libm::sin(PI * s));
             bed.smooth_height(x, y) - (LIFT.0 + (LIFT.1 - LIFT.0) * s) * radius
         },
     )

@@ -77,7 +77,7 @@ impl Tube {
     ) -> Self {
         let step = 1.0 / (POINTS - 1) as f64;
         let direction = |s: f64| {
-            let (sin, cos) = heading(s).sin_cos();
+            let (sin, cos) = libm::sincos(heading(s));
             DVec3::new(cos, sin, 0.0)
         };
         let mut p = DVec3::new(base.0, base.1, 0.0);
@@ -134,7 +134,7 @@ impl Tube {
                 let narrow = (1.0_f64 - along * along).sqrt();
                 let (a, b) = self.radii(i as f64 / (POINTS - 1) as f64);
                 for j in 0..AROUND {
-                    let (sin, cos) = (std::f64::consts::TAU * j as f64 / AROUND as f64).sin_cos();
+                    let (sin, cos) = libm::sincos(std::f64::consts::TAU * j as f64 / AROUND as f64);
                     let aside = across * (a * cos * narrow) + up * (b * sin * narrow);
                     points.push(self.line[i] + aside + self.tangents[i] * (along * a));
                 }
@@ -145,7 +145,7 @@ impl Tube {
 
     pub fn local(&self, p: DVec3) -> LocalPoint {
         let (s, offset) = self.project(p);
-        LocalPoint { s, angle: offset.y.atan2(offset.x) }
+        LocalPoint { s, angle: libm::atan2(offset.y, offset.x) }
     }
 
     /// The organ coordinate of the nearest centreline point, and the offset from it in the local
@@ -201,9 +201,9 @@ impl Tube {
         let uneven = 0.05 * noise::smooth(self.seed, DVec3::new(s * length / 0.012, 0.5, 0.5));
         // The cosine to a high power makes constrictions narrow and the parts between them wide.
         let phase = s * length / distance + 0.6 * noise::smooth(self.seed + 1, DVec3::new(s * length / 0.02, 0.5, 0.5));
-        let fold = (std::f64::consts::PI * phase).cos().powi(6);
+        let fold = libm::cos(std::f64::consts::PI * phase).powi(6);
         let r = (1.0 + (taper - 1.0) * s)
-            * (1.0 + bulge * (std::f64::consts::PI * s).sin() + uneven)
+            * (1.0 + bulge * libm::sin(std::f64::consts::PI * s) + uneven)
             * (1.0 + 0.35 * depth - depth * fold);
         (across * r, high * r)
     }

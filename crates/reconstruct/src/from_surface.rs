@@ -114,7 +114,7 @@ fn check_size(path: &Path, surface: &TriMesh, unit: Unit) -> Result<()> {
         return Ok(());
     }
     // Of the possible units, the one that makes the most typical organ: about 10 cm.
-    let oddness = |u: Unit| (extent / metres(unit) * metres(u) / 0.1).ln().abs();
+    let oddness = |u: Unit| libm::log(extent / metres(unit) * metres(u) / 0.1).abs();
     let better = UNITS
         .into_iter()
         .filter(|(_, u)| organ.contains(&(extent / metres(unit) * metres(*u))))

@@ -58,7 +58,7 @@ fn smooth(depth: &[f64], mask: &Mask, noise: f64) -> Vec<f64> {
         let mut count = 0;
         for j in window(mask, i) {
             let (x, y) = ((j % width) as f64 - u, (j / width) as f64 - v);
-            let weight = (-(x * x + y * y) / (2.0 * 1.5 * 1.5)).exp();
+            let weight = libm::exp(-(x * x + y * y) / (2.0 * 1.5 * 1.5));
             let row = [1.0, x, y, x * x, x * y, y * y, depth[j] - depth[i]];
             for (a, line) in normal.iter_mut().enumerate() {
                 for (b, entry) in line.iter_mut().enumerate() {

@@ -5,6 +5,8 @@
 //!           -> resample -> body -> check -> Specimen
 //! ```
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, reason = "the same bits on every processor"))]
+
 mod binary_grid;
 mod body;
 mod check;

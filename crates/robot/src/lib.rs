@@ -13,6 +13,8 @@
 //! # Ok::<(), trocar_robot::Error>(())
 //! ```
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, reason = "the same bits on every processor"))]
+
 pub mod chain;
 mod error;
 pub mod instrument;

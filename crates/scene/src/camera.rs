@@ -111,7 +111,7 @@ impl CellCamera {
         let [width, height] = self.size_px.map(|n| n as usize);
         let camera = match &self.lens {
             Lens::FieldOfView { width_deg, height_deg } => {
-                let focal = |pixels: usize, deg: f64| 0.5 * pixels as f64 / (0.5 * deg.to_radians()).tan();
+                let focal = |pixels: usize, deg: f64| 0.5 * pixels as f64 / libm::tan(0.5 * deg.to_radians());
                 let centred = Camera::centred(width, height, width_deg.to_radians());
                 Camera { fx: focal(width, *width_deg), fy: focal(height, *height_deg), ..centred }
             }

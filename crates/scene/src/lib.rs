@@ -10,6 +10,8 @@
 //! (`_deg`), pressures in pascals (`_pa`), forces in newtons (`_n`). Shares, organ coordinates and
 //! jaw openings run from 0 to 1 and have no unit.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, reason = "the same bits on every processor"))]
+
 mod anatomy;
 mod builtin;
 mod camera;

@@ -74,6 +74,6 @@ impl Port {
     /// for a shaft that does not fit.
     pub fn tilt_limit(&self, diameter_mm: f64) -> Option<f64> {
         let share = diameter_mm / self.hole_diameter_mm;
-        (share > 0.0 && share < 1.0).then(|| share.acos())
+        (share > 0.0 && share < 1.0).then(|| libm::acos(share))
     }
 }

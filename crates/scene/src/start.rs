@@ -35,8 +35,8 @@ impl Default for Start {
 impl Start {
     /// Unit vector along the shaft towards its tip, in the cell frame.
     pub fn direction(&self, port: &Port) -> DVec3 {
-        let (sin, cos) = self.tilt_deg.to_radians().sin_cos();
-        let (across, along) = self.azimuth_deg.to_radians().sin_cos();
+        let (sin, cos) = libm::sincos(self.tilt_deg.to_radians());
+        let (across, along) = libm::sincos(self.azimuth_deg.to_radians());
         port.frame().rotation * DVec3::new(sin * along, sin * across, -cos)
     }
 

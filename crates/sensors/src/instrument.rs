@@ -115,7 +115,7 @@ fn blade_of(kind: InstrumentKind, length: f64) -> TriMesh {
             }
             // The window in the blade.
             let along = p.x.clamp(0.35 * length, 0.72 * length);
-            d.max(0.0009 - (p.x - along).hypot(p.z))
+            d.max(0.0009 - libm::hypot(p.x - along, p.z))
         } else {
             // The edge is ground on one side.
             d.max(0.7 * (0.0012 - p.y - 2.0 * (p.z - aside + 0.5 * wide)))

@@ -6,6 +6,8 @@
 //! returns colour, metric depth, labels and normals. The result depends on the state of the cell
 //! only, not on the number of threads.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, reason = "the same bits on every processor"))]
+
 mod arm;
 mod camera;
 mod cell_stage;

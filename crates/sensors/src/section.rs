@@ -65,7 +65,7 @@ fn slice(mesh: &mut TriMesh, corners: [DVec3; 4], height: &dyn Fn(DVec3) -> f64,
     }
     let middle = ring.iter().sum::<DVec3>() / ring.len() as f64;
     let (x, y) = normal.any_orthonormal_pair();
-    let angle = |p: &DVec3| (*p - middle).dot(y).atan2((*p - middle).dot(x));
+    let angle = |p: &DVec3| libm::atan2((*p - middle).dot(y), (*p - middle).dot(x));
     ring.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
     let rim = color.map(|c| (0.62 * f64::from(c)) as u8);
     let n = ring.len() as u32;

@@ -133,7 +133,7 @@ pub(crate) fn revolve(profile: &[[f64; 2]]) -> TriMesh {
     let ring = |mesh: &mut TriMesh, [x, r]: [f64; 2]| {
         let first = mesh.vertices.len() as u32;
         for k in 0..SIDES {
-            let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(SIDES)).sin_cos();
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * f64::from(k) / f64::from(SIDES));
             mesh.vertices.push(DVec3::new(x, r * cos, r * sin));
         }
         first

@@ -62,7 +62,7 @@ fn shape(visual: &Visual) -> std::result::Result<TriMesh, trocar_geometry::Error
 fn capsule(radius: f64, half: f64) -> TriMesh {
     let profile: Vec<[f64; 2]> = (0..=16)
         .map(|k| {
-            let (sin, cos) = (std::f64::consts::PI * f64::from(k) / 16.0).sin_cos();
+            let (sin, cos) = libm::sincos(std::f64::consts::PI * f64::from(k) / 16.0);
             let end = if k <= 8 { -half } else { half };
             [end - radius * cos, if k % 16 == 0 { 0.0 } else { radius * sin }]
         })

@@ -6,6 +6,8 @@
 //! large fronts share the threads of the rayon pool that calls. The bits of a factor depend neither
 //! on the number of threads nor on the instruction set.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, reason = "the same bits on every processor"))]
+
 mod cholesky;
 mod dense;
 mod dissection;

@@ -8,6 +8,8 @@
 //! report.html       the page for people (written by `trocar reconstruct`)
 //! ```
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, reason = "the same bits on every processor"))]
+
 mod document;
 mod error;
 mod folder;

@@ -99,11 +99,11 @@ impl Parameter {
     /// The value of a score within a range: the logistic curve of the score is the share of the
     /// range, or of its logarithm.
     pub fn value(self, range: [f64; 2], score: f64) -> f64 {
-        let share = 1.0 / (1.0 + (-STEEPNESS * score).exp());
+        let share = 1.0 / (1.0 + libm::exp(-STEEPNESS * score));
         let [low, high] = range;
         match self.scale() {
             Scale::Linear => low + share * (high - low),
-            Scale::Log => low * (share * (high / low).ln()).exp(),
+            Scale::Log => low * libm::exp(share * libm::log(high / low)),
         }
     }
 
@@ -112,8 +112,8 @@ impl Parameter {
         let [low, high] = range;
         let share = match self.scale() {
             Scale::Linear => (value - low) / (high - low),
-            Scale::Log => (value / low).ln() / (high / low).ln(),
+            Scale::Log => libm::log(value / low) / libm::log(high / low),
         };
-        ((share / (1.0 - share)).ln() / STEEPNESS).clamp(-4.0, 4.0)
+        (libm::log(share / (1.0 - share)) / STEEPNESS).clamp(-4.0, 4.0)
     }
 }

@@ -62,7 +62,7 @@ impl Posterior {
             prior.interval = [low, at(0.0), high];
             prior.width = match prior.name.scale() {
                 Scale::Linear => (high - low) / (most - least),
-                Scale::Log => (high / low).ln() / (most / least).ln(),
+                Scale::Log => libm::log(high / low) / libm::log(most / least),
             };
         }
     }

@@ -97,7 +97,7 @@ impl Place {
             |organ: &Organ| organ.body.vertices.iter().sum::<DVec3>() / organ.body.vertices.len().max(1) as f64;
         let (from, to) = (base(given)?, base(own)?);
         let (ahead, wanted) = (level(tilt * (middle(given) - from)), level(middle(own) - to));
-        let turn = ahead.cross(wanted).dot(up).atan2(ahead.dot(wanted));
+        let turn = libm::atan2(ahead.cross(wanted).dot(up), ahead.dot(wanted));
         let upright = (DQuat::from_axis_angle(up, turn) * tilt).normalize();
         let lowest = |organ: &Organ, rotation: DQuat| {
             organ.body.vertices.iter().map(|p| (rotation * *p).dot(up)).fold(f64::INFINITY, f64::min)

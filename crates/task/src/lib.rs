@@ -4,6 +4,8 @@
 //! [`Channels`]; stages, sweeps and summaries are functions of rows alone. An episode file holds
 //! the actions and one state hash per step. Anyone can replay it and compare.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, reason = "the same bits on every processor"))]
+
 mod bodies;
 mod bounds;
 mod channels;

@@ -42,7 +42,7 @@ pub(crate) fn targets(cell: &Cell, seed: u64) -> Result<Vec<[DVec3; 3]>> {
             // Evenly over the cone's disc.
             let lean = tilt * random.unit(first).sqrt();
             let azimuth = std::f64::consts::TAU * random.unit(first + 1);
-            let pivots = [lean * azimuth.cos(), lean * azimuth.sin()];
+            let pivots = [lean * libm::cos(azimuth), lean * libm::sin(azimuth)];
             let low = limits.clamp(&Coordinates { pivots, insertion: limits.insertion[1], ..Coordinates::default() }).0;
             let deepest = cell.solve(name, &port.tip(&low), &low.into())?.setpoint.0[2] - TARGET_ABOVE;
             let insertion = random.within(first + 2, deepest - TARGET_RANGE, deepest).max(limits.insertion[0]);

@@ -12,6 +12,7 @@
 //! so short that `f32` would round slow motion away. A body with a node at the speed limit keeps
 //! its state of that instant, and the stepper reports it. Nothing is clamped.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, reason = "the same bits on every processor"))]
 #![forbid(unsafe_code)]
 
 mod comparator;

@@ -42,6 +42,7 @@
 //! # Ok::<(), trocar_tissue::Error>(())
 //! ```
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods, reason = "the same bits on every processor"))]
 #![forbid(unsafe_code)]
 
 pub mod assembly;

@@ -58,7 +58,7 @@ pub fn psnr_db(a: &[[f64; 3]], b: &[[f64; 3]], mask: &Mask) -> Result<f64> {
     }
     let squares = |i: usize| (0..3).map(|c| (a[i][c] - b[i][c]).powi(2)).sum::<f64>();
     let sum: f64 = (0..a.len()).filter(|i| mask.set[*i]).map(squares).sum();
-    Ok(10.0 * (255.0 * 255.0 * 3.0 * count as f64 / sum).log10())
+    Ok(10.0 * libm::log10(255.0 * 255.0 * 3.0 * count as f64 / sum))
 }
 
 /// A uniform picture with the rounded mean colour of the mask's pixels: a baseline that shows only

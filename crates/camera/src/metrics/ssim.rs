@@ -73,7 +73,7 @@ pub fn ssim(a: &[[f64; 3]], b: &[[f64; 3]], mask: &Mask) -> Result<Ssim> {
 /// weight.
 fn blur(plane: &[f64], width: usize) -> Vec<f64> {
     let window: Vec<f64> =
-        (0..=2 * REACH).map(|k| (-0.5 * ((k as f64 - REACH as f64) / SIGMA).powi(2)).exp()).collect();
+        (0..=2 * REACH).map(|k| libm::exp(-0.5 * ((k as f64 - REACH as f64) / SIGMA).powi(2))).collect();
     let sum: f64 = window.iter().sum();
     let window: Vec<f64> = window.iter().map(|w| w / sum).collect();
     let height = plane.len() / width.max(1);

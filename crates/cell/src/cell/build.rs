@@ -197,7 +197,7 @@ fn limits(port: &Port, instrument: &Instrument, blades: &Blades, floor: f64) -> 
     let mut limits = port.limits(instrument, MIN_CLEARANCE, MARGIN)?;
     let down = port.normal().dot(-DVec3::Z);
     if down > 0.1 {
-        let room = (port.centre().z - floor) / (down * limits.tilt.cos()) - blades.length;
+        let room = (port.centre().z - floor) / (down * libm::cos(limits.tilt)) - blades.length;
         limits.insertion[1] = limits.insertion[1].min(room.max(limits.insertion[0]));
     }
     Ok(limits)
@@ -212,7 +212,7 @@ pub(super) fn start(start: &Start, port: Option<&trocar_scene::Port>, workspace:
             let direction = port.map_or(-DVec3::Z, |port| start.direction(port));
             let u = space.port.pose.rotation.inverse() * direction;
             // The pivots rotate the port's z about x, then about the rotated y.
-            let pivots = [(-u.y).atan2(u.z), u.x.atan2(u.y.hypot(u.z))];
+            let pivots = [libm::atan2(-u.y, u.z), libm::atan2(u.x, libm::hypot(u.y, u.z))];
             let insertion = 1e-3 * start.insertion_mm - space.blade_length;
             Coordinates { pivots, insertion, roll, jaw: start.jaw }.into()
         }

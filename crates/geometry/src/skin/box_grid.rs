@@ -19,7 +19,7 @@ impl BoxGrid {
         let (lo, hi) = boxes.iter().fold(first, |(lo, hi), b| (lo.min(b.0), hi.max(b.1)));
         let mean = boxes.iter().map(|b| (b.1 - b.0).max_element()).sum::<f64>() / boxes.len() as f64;
         // Limits the number of cells to a few per box for any arrangement.
-        let coarsest = ((hi - lo).max(DVec3::splat(mean)).element_product() / (8 * boxes.len()) as f64).cbrt();
+        let coarsest = libm::cbrt((hi - lo).max(DVec3::splat(mean)).element_product() / (8 * boxes.len()) as f64);
         let cell = mean.max(coarsest);
         if !(cell > 0.0 && (hi - lo).is_finite()) {
             return None;

@@ -87,7 +87,7 @@ impl Limits {
             return [0.0; 3];
         }
         let at = ratio.max(PARABOLA_BEGINS);
-        let log = (at / BARRIER_BEGINS).ln();
+        let log = libm::log(at / BARRIER_BEGINS);
         let [energy, slope, curvature] =
             [0.5 * log * log, log / at, (1.0 - log) / (at * at)].map(|x| self.strength * x);
         let below = ratio - at;

@@ -181,7 +181,7 @@ impl Tissue {
                 here.iter().zip(there).map(|(x, before)| *x + further * (*x - *before)).collect()
             }
             None => {
-                let bulge = |i: usize| (-((self.axis.s[i] - at) * self.axis.length / BULGE).powi(2)).exp();
+                let bulge = |i: usize| libm::exp(-((self.axis.s[i] - at) * self.axis.length / BULGE).powi(2));
                 (0..here.len()).map(|i| here[i] + share * bulge(i) * whole).collect()
             }
         };

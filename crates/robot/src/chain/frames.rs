@@ -36,7 +36,7 @@ impl SerialArm {
             let axis = link.rotation * joint.axis;
             match joint.kind {
                 JointKind::Revolute => {
-                    let (sin, cos) = (0.5 * q.at(i)).sin_cos();
+                    let (sin, cos) = libm::sincos(0.5 * q.at(i));
                     let a = joint.axis * sin;
                     link.rotation *= DQuat::from_xyzw(a.x, a.y, a.z, cos);
                 }

@@ -368,5 +368,5 @@ pub(crate) fn rotation_vector(q: DQuat) -> DVec3 {
     let (v, w) = (DVec3::new(q.x, q.y, q.z), q.w);
     let (v, w) = if w < 0.0 { (-v, -w) } else { (v, w) };
     let s = v.length();
-    if s < 1e-12 { 2.0 * v } else { v * (2.0 * s.atan2(w) / s) }
+    if s < 1e-12 { 2.0 * v } else { v * (2.0 * libm::atan2(s, w) / s) }
 }

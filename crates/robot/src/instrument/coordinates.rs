@@ -42,15 +42,15 @@ impl Coordinates {
 
     /// Direction of the shaft in the port's frame: z rotated by the pivots.
     pub(crate) fn direction(pivots: [f64; 2]) -> glam::DVec3 {
-        let (sa, ca) = pivots[0].sin_cos();
-        let (sb, cb) = pivots[1].sin_cos();
+        let (sa, ca) = libm::sincos(pivots[0]);
+        let (sb, cb) = libm::sincos(pivots[1]);
         glam::DVec3::new(sb, -sa * cb, ca * cb)
     }
 
     /// Angle between the shaft and the port's normal (rad).
     pub fn tilt(&self) -> f64 {
         let u = Self::direction(self.pivots);
-        DVec2::new(u.x, u.y).length().atan2(u.z)
+        libm::atan2(DVec2::new(u.x, u.y).length(), u.z)
     }
 }
 
@@ -119,7 +119,7 @@ impl Limits {
             excess.tilt = tilt - self.tilt;
             let u = Coordinates::direction(wanted.pivots);
             let away = DVec2::new(u.x, u.y).try_normalize().unwrap_or(DVec2::X);
-            clamped.pivots = pivots(away * self.tilt.sin(), self.tilt.cos());
+            clamped.pivots = pivots(away * libm::sin(self.tilt), libm::cos(self.tilt));
         }
         (clamped.insertion, excess.insertion) = clamp_with_excess(wanted.insertion, self.insertion);
         (clamped.roll, excess.roll) = clamp_with_excess(wanted.roll, self.roll);
@@ -137,7 +137,7 @@ pub(crate) fn clamp_with_excess(value: f64, [low, high]: [f64; 2]) -> (f64, f64)
 /// The pivots that rotate the port's z to a direction, given by its part in the port's plane and
 /// its positive part along z.
 pub(crate) fn pivots(across: DVec2, along: f64) -> [f64; 2] {
-    [(-across.y).atan2(along), across.x.atan2(across.y.hypot(along))]
+    [libm::atan2(-across.y, along), libm::atan2(across.x, libm::hypot(across.y, along))]
 }
 
 #[cfg(test)]

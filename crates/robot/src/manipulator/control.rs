@@ -134,7 +134,7 @@ impl Controller<'_> {
         let n = before.q.len();
         let rate = Joints::from_fn(n, |i| (after.qd[i] - before.qd[i]) / dt);
         let inertial = dynamics.mass_matrix.times(&rate);
-        let share = 1.0 - (-self.settings.gains.observer * dt).exp();
+        let share = 1.0 - libm::exp(-self.settings.gains.observer * dt);
         for i in 0..n {
             if memory.paused.contains(i) {
                 continue;

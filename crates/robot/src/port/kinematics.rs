@@ -79,7 +79,7 @@ impl Port {
             return Err(Error::invalid("flange", "its pose must be finite"));
         }
         let across = DVec2::new(along.x, along.y);
-        let tilt = across.length().atan2(along.z);
+        let tilt = libm::atan2(across.length(), along.z);
         if along.z < MIN_TILT_COS {
             let reason =
                 format!("the shaft is tilted by {:.1} degrees; it must point into the body", tilt.to_degrees());
@@ -148,14 +148,14 @@ impl Port {
         let mut excess = Excess::default();
         let point = self.pose.inverse().transform(wanted.translation);
         let across = DVec2::new(point.x, point.y);
-        let tilt = across.length().atan2(point.z);
+        let tilt = libm::atan2(across.length(), point.z);
         let away = across.try_normalize().unwrap_or_else(|| {
             let u = Coordinates::direction(near.pivots);
             DVec2::new(u.x, u.y).try_normalize().unwrap_or(DVec2::X)
         });
         let (kept, beyond) = coordinates::clamp_with_excess(tilt, [0.0, limits.tilt]);
         excess.tilt = beyond;
-        let (sin, cos) = kept.sin_cos();
+        let (sin, cos) = libm::sincos(kept);
         // Inside the cone the wanted point lies on the ray; outside, the nearest point is its foot
         // on the cone's side.
         let length = across.length() * sin + point.z * cos;
@@ -189,12 +189,12 @@ impl Port {
     /// every roll is equally near, and the result is 0.
     fn nearest_roll(&self, pivots: [f64; 2], orientation: DQuat) -> f64 {
         let shaft = (self.pose.rotation * turn(pivots)).inverse() * orientation * shaft_to_tip().inverse();
-        if shaft.w.hypot(shaft.z) < 1e-12 {
+        if libm::hypot(shaft.w, shaft.z) < 1e-12 {
             return 0.0;
         }
         // The quaternion and its negative are one turn; this one is within half a turn.
         let sign = if shaft.w < 0.0 { -1.0 } else { 1.0 };
-        2.0 * (sign * shaft.z).atan2(sign * shaft.w)
+        2.0 * libm::atan2(sign * shaft.z, sign * shaft.w)
     }
 }
 
@@ -208,5 +208,5 @@ fn axis_angle(q: DQuat) -> DVec3 {
     let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
     let v = sign * DVec3::new(q.x, q.y, q.z);
     let sin = v.length();
-    if sin < 1e-150 { DVec3::ZERO } else { v * (2.0 * sin.atan2(sign * q.w) / sin) }
+    if sin < 1e-150 { DVec3::ZERO } else { v * (2.0 * libm::atan2(sin, sign * q.w) / sin) }
 }

@@ -106,11 +106,11 @@ impl Port {
     /// sheet without thickness. Negative if the shaft does not fit, minus infinity from 90 degrees
     /// on.
     pub fn clearance(&self, radius: f64, tilt: f64) -> f64 {
-        let cos = tilt.cos();
+        let cos = libm::cos(tilt);
         if cos.is_nan() || cos <= 1e-9 {
             return f64::NEG_INFINITY;
         }
-        0.5 * (self.hole_diameter - 2.0 * radius / cos - self.thickness * tilt.abs().tan())
+        0.5 * (self.hole_diameter - 2.0 * radius / cos - self.thickness * libm::tan(tilt.abs()))
     }
 
     /// Maximum distance (m) of the axis from the centre across the direction of the tilt, in a
@@ -121,7 +121,7 @@ impl Port {
     /// of the hole. The section touches at two points beside this end, and the distance is
     /// sin(tilt) sqrt((D/2)^2 - (d/2)^2/cos(tilt)^2).
     pub fn clearance_across(&self, radius: f64, tilt: f64) -> f64 {
-        let (big, k) = (0.5 * self.hole_diameter, tilt.cos() * tilt.cos());
+        let (big, k) = (0.5 * self.hole_diameter, libm::cos(tilt) * libm::cos(tilt));
         if big * k >= radius {
             return big - radius;
         }
@@ -134,8 +134,8 @@ impl Port {
     pub fn tilt_with_clearance(&self, radius: f64, clearance: f64) -> Option<f64> {
         // D' cos(tilt) - t sin(tilt) = d as a single cosine.
         let wide = self.hole_diameter - 2.0 * clearance;
-        let cos = 2.0 * radius / wide.hypot(self.thickness);
-        let tilt = cos.min(1.0).acos() - self.thickness.atan2(wide);
+        let cos = 2.0 * radius / libm::hypot(wide, self.thickness);
+        let tilt = libm::acos(cos.min(1.0)) - libm::atan2(self.thickness, wide);
         (wide >= 2.0 * radius && cos.is_finite()).then(|| tilt.max(0.0))
     }
 

@@ -114,14 +114,14 @@ fn minima(c: DVec2, u: DVec2, radius: f64) -> [Option<f64>; 2] {
     let (x, y) = (c.dot(tilted), tilted.perp_dot(c));
     let (kx, cy) = (k * x.abs(), y.abs());
     let back = |a: f64| {
-        let (sin, cos) = a.sin_cos();
+        let (sin, cos) = libm::sincos(a);
         let turned = DVec2::new(if x < 0.0 { -cos } else { cos }, if y < 0.0 { -sin } else { sin }).rotate(tilted);
-        turned.y.atan2(turned.x)
+        libm::atan2(turned.y, turned.x)
     };
     let near = bisect(0.0, FRAC_PI_2, |s, c| free * s * c + kx * s - cy * c);
-    let astroid = |v: f64| v.cbrt() * v.cbrt();
+    let astroid = |v: f64| libm::cbrt(v) * libm::cbrt(v);
     let other = (astroid(kx) + astroid(cy) < astroid(free)).then(|| {
-        let last = cy.cbrt().atan2(kx.cbrt());
+        let last = libm::atan2(libm::cbrt(cy), libm::cbrt(kx));
         back(PI - bisect(0.0, last, |s, c| free * s * c - kx * s - cy * c))
     });
     [Some(back(near)), other]
@@ -132,7 +132,7 @@ fn minima(c: DVec2, u: DVec2, radius: f64) -> [Option<f64>; 2] {
 fn bisect(mut low: f64, mut high: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
     for _ in 0..BISECTIONS {
         let middle = 0.5 * (low + high);
-        let (s, c) = middle.sin_cos();
+        let (s, c) = libm::sincos(middle);
         if f(s, c) < 0.0 { low = middle } else { high = middle }
     }
     0.5 * (low + high)

@@ -25,8 +25,8 @@ pub fn static_orientations(count: usize, tilt: f64) -> Result<Vec<DQuat>> {
     within("static poses, tilt", tilt, PI / 180.0, PI, "rad")?;
     let turn = PI * (3.0 - 5.0_f64.sqrt());
     let orientation = |k: usize| {
-        let z = 1.0 - (1.0 - tilt.cos()) * (k as f64 + 0.5) / count as f64;
-        let (sin, cos) = (turn * k as f64).sin_cos();
+        let z = 1.0 - (1.0 - libm::cos(tilt)) * (k as f64 + 0.5) / count as f64;
+        let (sin, cos) = libm::sincos(turn * k as f64);
         let across = (1.0 - z * z).max(0.0).sqrt();
         // Rotates the direction of gravity in the flange's frame to the cell's down.
         DQuat::from_rotation_arc(DVec3::new(across * cos, across * sin, z).normalize(), -DVec3::Z)

@@ -53,7 +53,7 @@ pub(super) fn show(value: f64) -> String {
     if !(1e-5..1e9).contains(&magnitude) {
         return format!("{value:e}");
     }
-    let digits = (5 - magnitude.log10().floor() as i32).clamp(0, 12) as usize;
+    let digits = (5 - libm::log10(magnitude).floor() as i32).clamp(0, 12) as usize;
     let text = format!("{value:.digits$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }

@@ -148,7 +148,7 @@ impl CellCamera {
         match &mut self.lens {
             Lens::FieldOfView { width_deg, height_deg } => {
                 for angle in [width_deg, height_deg] {
-                    *angle = 2.0 * ((0.5 * *angle).to_radians().tan() / scale).atan().to_degrees();
+                    *angle = 2.0 * libm::atan(libm::tan((0.5 * *angle).to_radians()) / scale).to_degrees();
                 }
             }
             Lens::Opencv { fx_px, fy_px, .. } => {

@@ -30,7 +30,7 @@ impl Distribution {
         match self {
             Self::Within(most) => random.aside(index, *most),
             Self::Uniform([low, high]) => random.within(index, *low, *high),
-            Self::LogUniform([low, high]) => random.within(index, low.ln(), high.ln()).exp(),
+            Self::LogUniform([low, high]) => libm::exp(random.within(index, libm::log(*low), libm::log(*high))),
             Self::Normal([mean, deviation]) => {
                 mean + deviation * random.normal(index).clamp(-MAX_DEVIATIONS, MAX_DEVIATIONS)
             }

@@ -45,7 +45,7 @@ impl RandomWalk {
         let [low, high] = limits.insertion;
         let low = if unit(2) < 0.5 { 0.5 * (low + high) } else { low };
         let c = Coordinates {
-            pivots: [lean * azimuth.cos(), lean * azimuth.sin()],
+            pivots: [lean * libm::cos(azimuth), lean * libm::sin(azimuth)],
             insertion: low + (high - low) * unit(3),
             roll: limits.roll[0] + (limits.roll[1] - limits.roll[0]) * unit(4),
             jaw: unit(5),

@@ -62,8 +62,8 @@ fn diagonalise(matrix: &mut Tangent) -> Option<Tangent> {
             }
             // The smaller rotation that makes the number between p and q zero.
             let theta = 0.5 * (matrix[q][q] - matrix[p][p]) / between;
-            let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
-            let (c, s) = (1.0 / t.hypot(1.0), t / t.hypot(1.0));
+            let t = theta.signum() / (theta.abs() + libm::hypot(theta, 1.0));
+            let (c, s) = (1.0 / libm::hypot(t, 1.0), t / libm::hypot(t, 1.0));
             let rotate = |a: f64, b: f64| (c * a - s * b, s * a + c * b);
             for column in matrix.iter_mut() {
                 (column[p], column[q]) = rotate(column[p], column[q]);

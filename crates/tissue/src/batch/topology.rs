@@ -153,7 +153,7 @@ impl Topology {
 
     /// Which factor serves a Young's modulus (Pa).
     pub fn factor_of(&self, young_modulus: f64) -> i32 {
-        ((young_modulus / self.young_modulus).ln() / FACTOR_RATIO.ln()).round() as i32
+        (libm::log(young_modulus / self.young_modulus) / libm::log(FACTOR_RATIO)).round() as i32
     }
 
     /// Makes a factor for steps of `h` (s).

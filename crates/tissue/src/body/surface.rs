@@ -158,7 +158,7 @@ impl Surface {
             let k = (0..3).find(|k| triangle[*k] == i).unwrap_or(0);
             let [b, c] = [1, 2].map(|n| x[triangle[(k + n) % 3] as usize] - x[i as usize]);
             let across = b.cross(c);
-            across.length().atan2(b.dot(c)) * across.normalize_or_zero()
+            libm::atan2f(across.length(), b.dot(c)) * across.normalize_or_zero()
         };
         self.fan(i).iter().map(at).sum()
     }

@@ -87,7 +87,7 @@ fn regular_volume(corners: [DVec3; 4]) -> f64 {
             squares += corners[i].distance_squared(corners[j]);
         }
     }
-    (squares / 6.0).powf(1.5) / (6.0 * std::f64::consts::SQRT_2)
+    libm::pow(squares / 6.0, 1.5) / (6.0 * std::f64::consts::SQRT_2)
 }
 
 fn check_pins(pinned: &[u32], nodes: usize) -> Result<(), String> {

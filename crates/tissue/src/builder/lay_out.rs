@@ -131,7 +131,7 @@ pub(crate) fn lay_out(description: BodyDescription<'_>, contact_stiffness: f64, 
             corners: body.corners.len() as u32,
             edges: body.edges.len() as u32,
             laplacian: 0.0,
-            contact_stiffness: (contact_stiffness * material.young_modulus * share[i].cbrt()) as f32,
+            contact_stiffness: (contact_stiffness * material.young_modulus * libm::cbrt(share[i])) as f32,
         };
         body.vertices.push(vertex);
         add_corners(&mut body, &incident[i]);

@@ -17,8 +17,8 @@ pub(super) fn capsule([a, b]: [DVec3; 2], radius: f64) -> TriMesh {
     let mut mesh = TriMesh::default();
     let mut ring = |centre: DVec3, latitude: f64| {
         for k in 0..SIDES {
-            let (sin, cos) = (TAU * f64::from(k) / f64::from(SIDES)).sin_cos();
-            let outwards = latitude.cos() * (cos * u + sin * v) + latitude.sin() * axis;
+            let (sin, cos) = libm::sincos(TAU * f64::from(k) / f64::from(SIDES));
+            let outwards = libm::cos(latitude) * (cos * u + sin * v) + libm::sin(latitude) * axis;
             mesh.vertices.push(centre + radius * outwards);
         }
     };

@@ -36,6 +36,6 @@ impl ToolMotion {
 
 /// Upper bound of how far a point travels between two poses, `arm` (m) away from their origin.
 pub(crate) fn travel(from: &Pose, to: &Pose, arm: f64) -> f64 {
-    let turn = 2.0 * (to.rotation * from.rotation.inverse()).xyz().length().min(1.0).asin();
+    let turn = 2.0 * libm::asin((to.rotation * from.rotation.inverse()).xyz().length().min(1.0));
     (to.translation - from.translation).length() + turn * arm
 }

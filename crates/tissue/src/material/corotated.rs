@@ -72,7 +72,7 @@ fn rotation(f: DMat3) -> DMat3 {
     for _ in 0..MAX_POLAR_STEPS {
         let cofactor = cofactor(x);
         let inverse = cofactor * (1.0 / x.x_axis.dot(cofactor.x_axis));
-        let scale = (dot(inverse, inverse) / dot(x, x)).powf(0.25);
+        let scale = (dot(inverse, inverse) / dot(x, x)).sqrt().sqrt();
         let next = (x * scale + inverse * (1.0 / scale)) * 0.5;
         let change = next - x;
         x = next;

@@ -32,7 +32,7 @@ impl VolumeEnergy {
         let d = j - self.alpha;
         let (mut energy, mut slope, mut curvature) = (0.5 * self.modulus * d * d, self.modulus * d, self.modulus);
         if j < BARRIER_BEGINS {
-            let log = (j / BARRIER_BEGINS).ln();
+            let log = libm::log(j / BARRIER_BEGINS);
             energy += 0.5 * self.strength * log * log;
             slope += self.strength * log / j;
             curvature += self.strength * (1.0 - log) / (j * j);

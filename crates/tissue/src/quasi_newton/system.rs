@@ -249,7 +249,7 @@ impl System {
 /// The rotation nearest to a matrix (Higham 1986, "Computing the polar decomposition": Newton's
 /// iteration). The identity where there is none.
 fn nearest_rotation(matrix: Mat3A) -> Mat3A {
-    let mut x = matrix * (1.0 / matrix.determinant().abs().cbrt().max(f32::MIN_POSITIVE));
+    let mut x = matrix * (1.0 / libm::cbrtf(matrix.determinant().abs()).max(f32::MIN_POSITIVE));
     for _ in 0..20 {
         x = 0.5 * (x + x.inverse().transpose());
     }

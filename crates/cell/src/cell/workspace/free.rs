@@ -59,7 +59,7 @@ impl FreeSpace {
             return Err(Error::Option(reason.to_owned()));
         }
         let hinge = self.rotation.inverse() * (tip.rotation * DVec3::Z);
-        let roll = if hinge.y.hypot(hinge.z) > 1e-9 { (-hinge.y).atan2(hinge.z) } else { near.roll() };
+        let roll = if libm::hypot(hinge.y, hinge.z) > 1e-9 { libm::atan2(-hinge.y, hinge.z) } else { near.roll() };
         // The nearest of the equivalent rolls, if it is within the limits.
         let nearest = roll + TAU * ((near.roll() - roll) / TAU).round();
         let roll = if nearest.abs() <= PI { nearest } else { roll };

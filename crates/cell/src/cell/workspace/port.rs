@@ -93,8 +93,8 @@ pub(super) fn paced(from: &Setpoint, to: &Setpoint, period: f64) -> (Setpoint, b
     let swing = [0, 1].map(|k| to.pivots[k] - from.pivots[k]);
     let (push, turn) = (to.insertion - from.insertion, to.roll - from.roll);
     let arm = from.insertion.max(to.insertion);
-    let angle = swing[0].hypot(swing[1]);
-    let way = push.hypot(arm * angle);
+    let angle = libm::hypot(swing[0], swing[1]);
+    let way = libm::hypot(push, arm * angle);
     let share = [TIP_SPEED / way, SWING_SPEED / angle, ROLL_SPEED / turn.abs()].map(|s| s * period);
     let share = share.into_iter().fold(1.0, f64::min);
     if share >= 1.0 {

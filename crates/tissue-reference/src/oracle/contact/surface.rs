@@ -42,7 +42,7 @@ impl Surface {
         let angle = |t: &[usize; 3]| {
             let [a, b, c] = t.map(|i| x[i] - p);
             let (la, lb, lc) = (a.length(), b.length(), c.length());
-            2.0 * a.dot(b.cross(c)).atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
+            2.0 * libm::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
         };
         self.triangles.iter().map(angle).sum::<f64>() > TAU
     }

@@ -63,13 +63,13 @@ impl Touch<'_> {
     pub fn gap(&self, x: &[DVec3], blur: f64) -> Gap {
         let measured: Vec<Measured> = self.pieces.iter().map(|piece| piece.at(x)).collect();
         let least = measured.iter().map(|m| m.distance).fold(f64::INFINITY, f64::min);
-        let shares: Vec<f64> = measured.iter().map(|m| (-(m.distance - least) / blur).exp()).collect();
+        let shares: Vec<f64> = measured.iter().map(|m| libm::exp(-(m.distance - least) / blur)).collect();
         let sum: f64 = shares.iter().sum();
         let side = match self.surface {
             Some(surface) if surface.surrounds(x, x[self.pieces[0].nodes[0]]) => -1.0,
             _ => 1.0,
         };
-        let rounded = if measured.len() > 1 { blur * sum.ln() } else { 0.0 };
+        let rounded = if measured.len() > 1 { blur * libm::log(sum) } else { 0.0 };
         let mut gap = Gap {
             depth: side * (least - rounded) - self.free,
             gradient: Vec::new(),
