@@ -42,8 +42,8 @@ const PARTS: u32 = 4;
 /// Contact that gives way by next to nothing, over the model's.
 const STIFF: f64 = 50.0;
 
-/// A contact's force by the fast solver beside the oracle's on the same mesh, and of a scene's tissue
-/// beside Hertz.
+/// A contact's force by the fast solver beside the oracle's on the same mesh, and that of a scene's
+/// tissue beside Hertz's.
 #[derive(Clone, Debug, Args)]
 pub struct ContactExperiment {
     /// Elements over the thickness of the layer (8 mm); 2, 4 and 6 by default.
