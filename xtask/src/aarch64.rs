@@ -1,10 +1,9 @@
 //! The same bits on 64-bit ARM as on x86-64: the program is cross-compiled and run in an emulator.
 //!
-//! The golden tests of the solvers run there, and a short demonstration runs on both: recording,
-//! reconstruction and episode. The emulator is some twenty times slower than the machine.
+//! The golden tests of the solvers and of the cell run there, and a phantom is recorded and
+//! reconstructed on both. The emulator is some twenty times slower than the machine.
 
-use serde_json::Value;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 const TARGET: &str = "aarch64-unknown-linux-gnu";
@@ -19,10 +18,13 @@ const EMULATORS: [&str; 2] = ["qemu-aarch64", "qemu-aarch64-static"];
 const LIBRARIES: &str = "/usr/aarch64-linux-gnu";
 
 /// Crates that have golden tests.
-const CRATES: [&str; 2] = ["trocar-tissue", "trocar-tissue-reference"];
+const CRATES: [&str; 3] = ["trocar-tissue", "trocar-tissue-reference", "trocar-cell"];
 
-/// Frames of the demonstration's recording.
+/// Frames of the recording.
 const FRAMES: &str = "31";
+
+/// Where recording and specimen are written.
+const FOLDER: &str = "target/aarch64";
 
 /// Compares both machines; says so where that is not possible here.
 ///
@@ -50,30 +52,59 @@ pub fn check() -> Result<(), String> {
     }
     cross(&["build", "-p", "trocar-cli"])?;
     run(Command::new(cargo()).args(["build", "--release", "--locked", "-p", "trocar-cli"]))?;
-    let own = demonstration(&mut Command::new("target/release/trocar"), "x86-64")?;
-    let mut program = Command::new(emulator);
-    program.args(["-L", LIBRARIES]).arg(format!("target/{TARGET}/release/trocar"));
-    let other = demonstration(&mut program, "aarch64")?;
-    if own != other {
-        return Err(format!("the demonstration ends in state {own} on x86-64, in {other} on aarch64"));
+    let own = reconstructed("x86-64", || Command::new("target/release/trocar"))?;
+    let other = reconstructed("aarch64", || {
+        let mut program = Command::new(emulator);
+        program.args(["-L", LIBRARIES]).arg(format!("target/{TARGET}/release/trocar"));
+        program
+    })?;
+    let (found, expected) = (files(&other)?, files(&own)?);
+    if found != expected {
+        return Err(format!("{} has {} files, {} has {}", other.display(), found.len(), own.display(), expected.len()));
     }
-    eprintln!("\nthe golden hashes hold on aarch64, and the demonstration ends in state {own} on both");
+    for file in &found {
+        if read(&other.join(file))? != read(&own.join(file))? {
+            return Err(format!("{} and {} differ", other.join(file).display(), own.join(file).display()));
+        }
+    }
+    eprintln!(
+        "\nthe golden hashes hold on aarch64; {} files of a recording and its specimen are the same",
+        found.len()
+    );
     Ok(())
 }
 
-/// Runs the demonstration; returns the hash of its last state.
-fn demonstration(program: &mut Command, machine: &str) -> Result<String, String> {
-    eprintln!("\n== demonstration on {machine}");
-    let folder = Path::new("target/demonstration").join(machine);
-    let output = program
-        .args(["demo", "--json", "--no-open", "--frames", FRAMES, "--output"])
-        .arg(&folder)
-        .stderr(Stdio::inherit())
-        .output()
-        .map_err(|e| format!("{machine}: {e}"))?;
-    let result: Value = serde_json::from_slice(&output.stdout).map_err(|e| format!("demo on {machine}: {e}"))?;
-    let state = result["state"].as_str().ok_or_else(|| format!("demo on {machine} gives no state"))?;
-    Ok(state.to_owned())
+/// Records and reconstructs a phantom with a program; returns the folder of both.
+fn reconstructed(machine: &str, program: impl Fn() -> Command) -> Result<PathBuf, String> {
+    let folder = Path::new(FOLDER).join(machine);
+    if folder.exists() {
+        std::fs::remove_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    }
+    let [recording, specimen] = ["recording", "specimen"].map(|name| folder.join(name));
+    run(program().args(["record", "phantom-a", "--frames", FRAMES, "--output"]).arg(&recording))?;
+    run(program().arg("reconstruct").arg(&recording).arg("--output").arg(&specimen))?;
+    Ok(folder)
+}
+
+/// The files in a folder and in those within it, by their paths from there, sorted.
+fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let failed = |e: std::io::Error| format!("{}: {e}", folder.display());
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        let name = PathBuf::from(entry.file_name());
+        if entry.path().is_dir() {
+            found.extend(files(&entry.path())?.into_iter().map(|path| name.join(path)));
+        } else {
+            found.push(name);
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, String> {
+    std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))
 }
 
 /// Whether a program is there.

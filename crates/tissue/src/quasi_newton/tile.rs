@@ -14,6 +14,9 @@ const MAX_INT8: f32 = 127.0;
 /// Greatest number of a rounded vector.
 const MAX_INT16: f32 = 32767.0;
 
+/// Numbers that are all smaller than this count as 0.
+const MIN_GREATEST: f32 = 1e-30;
+
 /// Column k is paired with column k + 8.
 const PAIRS: usize = TILE_SIZE / 2;
 
@@ -109,10 +112,10 @@ pub(super) fn round<S: Simd>(simd: S, x: &mut [f32], scales: &[f32]) -> f32 {
     most / limit
 }
 
-/// What numbers up to `most` are multiplied by to be at most `limit`.
+/// What numbers up to `most` are multiplied by to be at most `limit`: 0 where that is not finite.
 #[inline(always)]
-fn per_unit(most: f32, limit: f32) -> f32 {
-    if most > f32::MIN_POSITIVE { limit / most } else { 0.0 }
+pub(super) fn per_unit(most: f32, limit: f32) -> f32 {
+    if most > MIN_GREATEST { limit / most } else { 0.0 }
 }
 
 /// The sum over lanes of each of 16 vectors.
@@ -168,5 +171,29 @@ mod tests {
                 assert!((transposed[k] * unit_transposed / Tile::UNIT - column).abs() < most);
             }
         });
+    }
+
+    /// Sums in 32 bits bear tall columns of the greatest numbers, and tiny vectors are 0.
+    #[test]
+    fn tall_columns_do_not_overflow_and_tiny_vectors_vanish() {
+        let ones = Tile::pack(Isa::Portable.level(), |_, _| 1.0)[0];
+        let sum = |isa: Isa, number: f32, tiles: usize| {
+            dispatch!(isa.level(), simd => {
+                let mut x = vec![number; TILE_SIZE * tiles];
+                let unit = round(simd, &mut x, &vec![1.0; TILE_SIZE * tiles]);
+                let mut sums = [i32x16::splat(simd, 0); TILE_SIZE];
+                for x in x.chunks_exact(TILE_SIZE) {
+                    ones.add_transposed(simd, i32x16::truncate_from(f32x16::from_slice(simd, x)), &mut sums);
+                }
+                transpose_sum(simd, &sums)[0] * unit / Tile::UNIT
+            })
+        };
+        for isa in Isa::ALL {
+            for tiles in [1, 516, 517, 3000] {
+                let expected = (TILE_SIZE * tiles) as f32;
+                assert!((sum(isa, 1.0, tiles) / expected - 1.0).abs() < 1e-3, "{}, {tiles} tiles", isa.name());
+            }
+            assert_eq!(sum(isa, 1e-36, 2), 0.0, "{}", isa.name());
+        }
     }
 }

@@ -12,7 +12,7 @@
 //! leaves the preconditioner symmetric and positive definite, up to the rounding of vectors.
 
 use super::supernode::{Supernode, TILE_SIZE};
-use super::tile::{Tile, pairs, round, transpose_sum};
+use super::tile::{Tile, pairs, per_unit, round, transpose_sum};
 use super::tile_parts::{Part, Parts};
 use super::tree::Tree;
 use crate::threads::for_each;
@@ -123,13 +123,13 @@ impl Tiles {
             unpacked.extend((0..height).map(|r| at(r, c)));
             let column = &mut unpacked[begin..];
             *scale = column.iter().fold(0.0, |most: f32, x| most.max(x.abs()));
-            let per_unit = if *scale > 0.0 { 1.0 / *scale } else { 0.0 };
+            let per_unit = per_unit(*scale, 1.0);
             for (x, most) in column.iter_mut().zip(&mut *of_rows) {
                 *x *= per_unit;
                 *most = most.max(x.abs());
             }
         }
-        let per_unit: Vec<f32> = of_rows.iter().map(|most| if *most > 0.0 { 1.0 / most } else { 0.0 }).collect();
+        let per_unit: Vec<f32> = of_rows.iter().map(|most| per_unit(*most, 1.0)).collect();
         for j in 0..columns {
             for i in if triangle { j } else { 0 }..rows {
                 let [tile, remainder] = Tile::pack(level, |r, c| {
