@@ -3,6 +3,7 @@
 //! The golden tests of the solvers and of the cell run there, and a phantom is recorded and
 //! reconstructed on both. The emulator is some twenty times slower than the machine.
 
+use crate::cargo_program;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -45,13 +46,16 @@ pub fn check() -> Result<(), String> {
         let name = TARGET.replace('-', "_").to_uppercase();
         let variables =
             [(format!("CARGO_TARGET_{name}_LINKER"), LINKER), (format!("CARGO_TARGET_{name}_RUNNER"), &emulated)];
-        run(Command::new(cargo()).args(arguments).args(["--release", "--locked", "--target", TARGET]).envs(variables))
+        run(Command::new(cargo_program())
+            .args(arguments)
+            .args(["--release", "--locked", "--target", TARGET])
+            .envs(variables))
     };
     for name in CRATES {
         cross(&["test", "-p", name, "--test", "golden"])?;
     }
     cross(&["build", "-p", "trocar-cli"])?;
-    run(Command::new(cargo()).args(["build", "--release", "--locked", "-p", "trocar-cli"]))?;
+    run(Command::new(cargo_program()).args(["build", "--release", "--locked", "-p", "trocar-cli"]))?;
     let own = reconstructed("x86-64", || Command::new("target/release/trocar"))?;
     let other = reconstructed("aarch64", || {
         let mut program = Command::new(emulator);
@@ -111,10 +115,6 @@ fn read(path: &Path) -> Result<Vec<u8>, String> {
 fn starts(name: &str) -> bool {
     let version = Command::new(name).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
     version.is_ok_and(|status| status.success())
-}
-
-fn cargo() -> String {
-    std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned())
 }
 
 fn run(command: &mut Command) -> Result<(), String> {

@@ -175,9 +175,14 @@ fn fuzz(cases: usize) -> ExitCode {
     ExitCode::SUCCESS
 }
 
+/// The cargo that runs this program.
+fn cargo_program() -> String {
+    std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned())
+}
+
 /// Runs cargo; says whether it went well.
 fn cargo(arguments: &[&str], variables: &[(&str, &str)]) -> bool {
-    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
+    let cargo = cargo_program();
     match Command::new(&cargo).args(arguments).envs(variables.iter().copied()).status() {
         Ok(status) => status.success(),
         Err(e) => {
