@@ -16,9 +16,6 @@ use glam::Vec3A;
 /// Held nodes this near to their targets have arrived (m): rounding of positions.
 const ARRIVED: f32 = 1e-7;
 
-/// Guessed motions below this are left out (m): a body at rest starts where it is.
-const MIN_GUESSED_MOTION: f32 = 1e-9;
-
 /// Squeezed elements are relieved one by one if there are at most this many and a hundredth of all.
 const MAX_RELIEVED: usize = 8;
 
@@ -42,21 +39,23 @@ pub(super) enum ConstraintMotion {
 }
 
 impl QuasiNewtonSolver {
-    /// Moves to the start of the search, and evaluates the elements there.
-    pub(super) fn start_substep(&mut self, frame: &Frame<'_>, share: f64, h: f32, body: &Body) -> InitialGuess {
+    /// Moves to the start of the search, and evaluates the elements there. A body of which no node
+    /// goes farther than `still` (m) starts where it is.
+    pub(super) fn start_substep(
+        &mut self,
+        frame: &Frame<'_>,
+        share: f64,
+        h: f32,
+        still: f32,
+        body: &Body,
+    ) -> InitialGuess {
         let free = self.layout.free;
+        let mut moves = self.farthest_free_motion(h) > still;
         let Iterate { start, v, targets, .. } = &mut self.iterate;
-        let mut moves = false;
-        for i in 0..free {
-            let mut to = start[i];
-            for c in 0..3 {
-                let by = h * v[i][c];
-                if !self.held[i] && by.abs() > MIN_GUESSED_MOTION {
-                    to[c] += by;
-                }
-            }
-            moves |= to != start[i];
-            targets[i] = to;
+        targets[..free].copy_from_slice(&start[..free]);
+        if moves {
+            let free_nodes = targets.iter_mut().zip(v.iter()).zip(&self.held).filter(|(_, held)| !**held);
+            free_nodes.for_each(|((to, v), _)| (0..3).for_each(|c| to[c] += h * v[c]));
         }
         let (layout, start) = (&self.layout, &*start);
         let (mut yielded, mut carried) = (false, false);

@@ -8,6 +8,9 @@ use glam::Vec3A;
 /// Friction that changes by this share of the largest limit has another minimum.
 const LIMIT_SHARE: f32 = 0.02;
 
+/// A body at rest is in equilibrium up to this share of its weight.
+const STILL_SHARE: f32 = 1e-4;
+
 /// Bodies that may touch each other, in a frame.
 pub(super) type IslandSystem<'a> = IslandFrame<'a, QuasiNewtonSolver>;
 
@@ -87,14 +90,20 @@ impl IslandSystem<'_> {
         most > LIMIT_SHARE * largest
     }
 
-    /// Rounding of positions (m).
-    pub fn rounding(&mut self) -> f32 {
-        2.0 * f32::EPSILON * self.active().map(|body| body.extent()).fold(0.0, f32::max)
+    /// The correction that ends a search (m); rounding of positions is none.
+    pub fn tolerance(&mut self) -> f32 {
+        (self.slots[0].solver.settings.tolerance as f32).max(self.rounding())
     }
 
-    /// What bodies at rest do not move in a substep (m): rounding, or a small share of what gravity
-    /// would move them.
+    /// What a body at rest may go in a substep, and be off its equilibrium (m): a small share of
+    /// what gravity would move it, but no less than rounding.
     pub fn still(&mut self) -> f32 {
-        (1e-4 * self.h * self.h * self.frame.gravity.length() as f32).max(self.rounding())
+        let fall = self.h * self.h * self.frame.gravity.length() as f32;
+        if fall > 0.0 { (STILL_SHARE * fall).max(self.rounding()) } else { self.tolerance() }
+    }
+
+    /// Rounding of positions (m).
+    fn rounding(&mut self) -> f32 {
+        2.0 * f32::EPSILON * self.all().map(|body| body.extent()).fold(0.0, f32::max)
     }
 }

@@ -15,12 +15,6 @@ const MAX_FRICTION_ROUNDS: usize = 4;
 /// most this many times the one that ends a substep: rounding, not a failed search.
 const MAX_ROUNDING_FACTOR: f32 = 100.0;
 
-/// The correction that ends a substep: absolute (m), and relative to the body's motion.
-struct Tolerance {
-    absolute: f32,
-    relative: f32,
-}
-
 impl IslandSystem<'_> {
     /// Minimises the potential of a substep, which ends when `share` of the frame is over.
     ///
@@ -28,10 +22,11 @@ impl IslandSystem<'_> {
     /// velocity.
     pub fn minimise(&mut self, share: f64) -> bool {
         let alone = self.pairs.is_empty();
-        self.start(share);
+        let still = self.still();
+        self.start(share, still);
         let moved = self.all().any(|body| body.progress.guess != InitialGuess::Still);
         let behind = self.all().any(|body| body.progress.guess == InitialGuess::Behind);
-        self.choose_active(alone);
+        self.choose_active(alone, still);
         self.for_active(|body| {
             if body.progress.guess != InitialGuess::Still {
                 body.update_stiffened();
@@ -40,10 +35,9 @@ impl IslandSystem<'_> {
         });
         let mut stepped = behind && self.move_constraints();
         let settings = self.slots[0].solver.settings;
-        let (tolerance, at_rest) = self.tolerances();
-        let Tolerance { absolute, relative } = tolerance;
+        let (absolute, relative) = (self.tolerance(), settings.relative as f32);
         if alone {
-            self.rest_alone(absolute.min(at_rest));
+            self.rest_alone(still);
         }
         let mut rounds = 0;
         self.history.scale = 1.0;
@@ -67,7 +61,7 @@ impl IslandSystem<'_> {
                     }
                     continue;
                 }
-                if self.active().all(|body| body.progress.longest <= at_rest) {
+                if self.active().all(|body| body.progress.longest <= still) {
                     // At rest: the remaining velocity is noise.
                     self.active().for_each(|body| body.iterate.v.fill([0.0; 4]));
                     return true;
@@ -95,7 +89,7 @@ impl IslandSystem<'_> {
     }
 
     /// Predicts, moves the bodies to the start of the search, and evaluates them there.
-    fn start(&mut self, share: f64) {
+    fn start(&mut self, share: f64, still: f32) {
         let (h, gravity) = (self.h, self.gravity());
         for member in 0..self.slots.len() {
             self.slots[member].solver.touching.pressed = self.pairs.presses(self.slots, member);
@@ -103,7 +97,7 @@ impl IslandSystem<'_> {
         let frame = self.frame;
         for_each(self.slots, frame, |BodySlot { index, body, solver, report, .. }| {
             solver.predict(h, gravity);
-            solver.progress.guess = solver.start_substep(&frame.of(*index), share, h, body);
+            solver.progress.guess = solver.start_substep(&frame.of(*index), share, h, still, body);
             solver.update_warp();
             report.grasp_limited += usize::from(solver.progress.yielded);
             solver.system.reset_update();
@@ -114,21 +108,10 @@ impl IslandSystem<'_> {
         self.frame.gravity.as_vec3a().extend(0.0).to_array()
     }
 
-    /// The tolerance of the search, and the correction (m) below which a body that does not move is
-    /// at rest. Rounding of positions is no correction, nor, at rest, the motion by gravity in a
-    /// short substep.
-    fn tolerances(&mut self) -> (Tolerance, f32) {
-        let (settings, rounding, h) = (self.slots[0].solver.settings, self.rounding(), self.h);
-        let at_rest =
-            if self.gravity() == [0.0; 4] { f32::INFINITY } else { 1e-4 * h * h * self.frame.gravity.length() as f32 };
-        let absolute = (settings.tolerance as f32).max(rounding);
-        (Tolerance { absolute, relative: settings.relative as f32 }, at_rest)
-    }
-
     /// Computes the gradient at the start of the search, and decides which bodies take part: among
     /// several bodies, one that neither moves nor would be moved by the forces on it stays where it
     /// is.
-    fn choose_active(&mut self, alone: bool) {
+    fn choose_active(&mut self, alone: bool, still: f32) {
         let h = self.h;
         for body in self.all() {
             body.sleep.was_resting = !std::mem::replace(&mut body.sleep.active, true);
@@ -141,7 +124,6 @@ impl IslandSystem<'_> {
             return;
         }
         self.record_pushes();
-        let still = self.still();
         for_each(self.slots, self.frame, |BodySlot { solver, .. }| {
             if solver.is_quiet(h, still) && solver.correction_at_rest() <= still {
                 solver.leave_at_rest(h);
@@ -153,13 +135,14 @@ impl IslandSystem<'_> {
     }
 
     /// Lets a single body stay where it is, if it is at rest.
-    fn rest_alone(&mut self, limit: f32) {
+    fn rest_alone(&mut self, still: f32) {
         let h = self.h;
         if let [BodySlot { solver, .. }] = self.slots
             && solver.progress.guess == InitialGuess::Still
-            && solver.is_quiet(h, limit)
-            && solver.correction_at_rest() <= limit
+            && solver.is_quiet(h, still)
+            && solver.correction_at_rest() <= still
         {
+            solver.settle(h);
             solver.leave_at_rest(h);
         }
     }

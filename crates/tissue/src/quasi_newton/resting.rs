@@ -6,6 +6,12 @@ use super::sleep::RestCache;
 use crate::lanes::{Row, same_rows};
 use fearless_simd::dispatch;
 
+/// A body that comes to rest takes at most this many steps to its equilibrium, as long as each
+/// correction is at most this share of the one before: then only rounding is left, or slow motion
+/// that hardly matters.
+const MAX_SETTLING_STEPS: usize = 32;
+const MAX_SETTLING_RATIO: f32 = 0.95;
+
 impl QuasiNewtonSolver {
     /// Evaluates the elements where the body is and stays, and accepts their volumes. A body that
     /// has not moved since it was last evaluated in place is not evaluated again.
@@ -45,7 +51,13 @@ impl QuasiNewtonSolver {
     /// Whether no node moves farther than `way` (m) freely in a substep of `h` (s), and no tool
     /// carries one.
     pub fn is_quiet(&self, h: f32, way: f32) -> bool {
-        !self.progress.carried && h * dispatch!(self.level, _simd => max_coordinate(&self.iterate.v)) <= way
+        !self.progress.carried && self.farthest_free_motion(h) <= way
+    }
+
+    /// The largest coordinate of the free motion of a node in a substep of `h` (m). Held nodes have
+    /// no velocity.
+    pub fn farthest_free_motion(&self, h: f32) -> f32 {
+        h * dispatch!(self.level, _simd => max_coordinate(&self.iterate.v))
     }
 
     /// The largest motion of a node by the gradient (m), without the history. It overwrites the
@@ -74,14 +86,53 @@ impl QuasiNewtonSolver {
         correction
     }
 
-    /// Lets the body stay where the substep began.
-    pub fn leave_at_rest(&mut self, h: f32) {
-        self.restore();
+    /// Brings a body that comes to rest into equilibrium, as exactly as rounding lets it. One that
+    /// already is at rest, without velocity, stays where it is.
+    pub fn settle(&mut self, h: f32) {
+        if self.iterate.v.as_flattened().iter().all(|v| *v == 0.0) {
+            return;
+        }
+        let free = self.layout.free;
+        self.drop_velocity(h);
+        self.update_contacts();
+        let mut last = f32::INFINITY;
+        for _ in 0..MAX_SETTLING_STEPS {
+            self.take_gradient(h);
+            self.accept_gradient();
+            let correction = self.correction();
+            if correction > MAX_SETTLING_RATIO * last {
+                break;
+            }
+            last = correction;
+            self.turn_downhill();
+            let Iterate { base, x, .. } = &mut self.iterate;
+            base.copy_from_slice(&x[..self.layout.rows]);
+            if !self.apply_step(1.0, h) {
+                break;
+            }
+            self.elements.accept();
+            let Iterate { predictor, start, x, .. } = &mut self.iterate;
+            for ((y, start), x) in predictor.iter_mut().zip(start).zip(&x[..free]) {
+                (0..3).for_each(|c| y[c] += x[c] - start[c]);
+                *start = *x;
+            }
+            self.evaluate_in_place(h);
+        }
+    }
+
+    /// Drops the velocities and their part of the predictor.
+    fn drop_velocity(&mut self, h: f32) {
         let Iterate { predictor, v, .. } = &mut self.iterate;
         for (y, v) in predictor.iter_mut().zip(v.iter()) {
             (0..3).for_each(|c| y[c] -= h * v[c]);
         }
         v.fill([0.0; 4]);
+    }
+
+    /// Lets the body stay where the substep began.
+    pub fn leave_at_rest(&mut self, h: f32) {
+        self.restore();
+        self.drop_velocity(h);
         self.sleep.active = false;
     }
 

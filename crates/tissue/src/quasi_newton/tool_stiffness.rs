@@ -60,6 +60,8 @@ impl QuasiNewtonSolver {
     pub(super) fn add_stiffness(&mut self, body: &Body, group: &ToolGroup<'_>, sum: &mut [[f64; 6]; 6]) {
         // Elements are as stiff as at rest.
         self.system.forget_stiffened();
+        // A body at rest has not needed the contacts that are not in the factor.
+        self.update_contacts();
         let springs = self.springs(body, group);
         if !springs.iter().any(Spring::moves) {
             return;
