@@ -53,8 +53,11 @@ pub fn clusters(world: &World, organ: usize) -> Vec<Cluster> {
         clusters[k].nodes.push(i);
     }
     let clearance = CLEARANCE.max(CLEARANCE_EDGES * body.median_edge());
+    let rest = body.rest_positions();
+    let mut pinned: Vec<DVec3> = (0..rest.len()).filter(|i| body.pinned()[*i]).map(|i| rest[i]).collect();
+    pinned.sort_by(|a, b| a.x.total_cmp(&b.x));
     for cluster in &mut clusters {
-        keep_clear(cluster, body, clearance);
+        keep_clear(cluster, rest, &pinned, clearance);
     }
     clusters.retain(|c| !c.nodes.is_empty());
     clusters
@@ -72,13 +75,14 @@ fn not_beside_pins(body: &Body) -> impl Iterator<Item = u32> + use<> {
 }
 
 /// Removes the cluster's nodes within `clearance` (m) of pinned tissue at rest. If too few are
-/// left, the clearance is halved, and so on.
-fn keep_clear(cluster: &mut Cluster, body: &Body, clearance: f64) {
-    let rest = body.rest_positions();
-    let pinned: Vec<DVec3> = (0..rest.len()).filter(|i| body.pinned()[*i]).map(|i| rest[i]).collect();
+/// left, the clearance is halved, and so on. Nodes are at `rest` (m), `pinned` ones ascend along x.
+fn keep_clear(cluster: &mut Cluster, rest: &[DVec3], pinned: &[DVec3], clearance: f64) {
+    // Beyond the clearance it does not matter how far.
     let gap = |i: u32| {
-        let to = |p: &DVec3| (rest[i as usize] - p).length_squared();
-        pinned.iter().map(to).fold(f64::INFINITY, f64::min).sqrt()
+        let p = rest[i as usize];
+        let first = pinned.partition_point(|q| q.x < p.x - clearance);
+        let near = pinned[first..].iter().take_while(|q| q.x <= p.x + clearance);
+        near.map(|q| q.distance_squared(p)).fold(f64::INFINITY, f64::min).sqrt()
     };
     let gaps: Vec<(u32, f64)> = cluster.nodes.iter().map(|i| (*i, gap(*i))).collect();
     for halvings in 0..=CLEARANCE_HALVINGS {

@@ -23,6 +23,9 @@ const ATTACH_WITHIN: f64 = 0.012;
 /// An element is sampled at its centroid, and at this share of the way from there to each corner.
 const TOWARDS_CORNER: f64 = 0.5;
 
+/// Room for rounding around the box in which samples are looked for (m).
+const BOX_MARGIN: f64 = 1e-6;
+
 /// The wedge between the blades at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JawRegion {
@@ -87,16 +90,16 @@ impl JawRegion {
         self.grasped(found)
     }
 
-    #[inline(always)]
     fn add_elements(&self, tets: &[[u32; 4]], positions: &[DVec3], found: &mut Samples) {
+        let sides = self.sides(positions);
         for tet in tets {
+            if is_beside(&sides, tet) {
+                continue;
+            }
             let corners = tet.map(|i| positions[i as usize]);
             let [a, b, c, d] = corners;
             let share = (b - a).cross(c - a).dot(d - a).abs() / 30.0;
             let middle = 0.25 * (a + b + c + d);
-            if self.is_far(middle, &corners) {
-                continue;
-            }
             for p in corners.map(|c| middle.lerp(c, TOWARDS_CORNER)).into_iter().chain([middle]) {
                 self.add_sample(p, share, found);
             }
@@ -106,26 +109,30 @@ impl JawRegion {
     /// Adds a layer of `depth` (m) under triangles with vertices at `positions` (m, world), sampled
     /// at four points each.
     fn add_layer(&self, triangles: &[[u32; 3]], positions: &[DVec3], depth: f64, found: &mut Samples) {
+        let sides = self.sides(positions);
         for triangle in triangles {
+            if is_beside(&sides, triangle) {
+                continue;
+            }
             let corners = triangle.map(|i| positions[i as usize]);
             let [a, b, c] = corners;
             let share = depth * (b - a).cross(c - a).length() / 8.0;
             let middle = (a + b + c) / 3.0;
-            if self.is_far(middle, &corners) {
-                continue;
-            }
             for p in corners.map(|c| middle.lerp(c, TOWARDS_CORNER)).into_iter().chain([middle]) {
                 self.add_sample(p, share, found);
             }
         }
     }
 
-    /// Whether no sample of an element or triangle around `middle` can be in the wedge: none is
-    /// farther from there than half of the way to a corner.
-    #[inline(always)]
-    fn is_far<const N: usize>(&self, middle: DVec3, corners: &[DVec3; N]) -> bool {
-        let reach = corners.map(|c| c.distance_squared(middle)).into_iter().fold(0.0, f64::max).sqrt();
-        middle.distance(self.gripper.pose.translation) > self.length + BLADE_WIDTH + reach
+    /// The faces of a box around the wedge that each point is beyond: a bit a face.
+    fn sides(&self, positions: &[DVec3]) -> Vec<u8> {
+        let low = DVec3::new(0.0, -self.gripper.half_gap(self.length), -0.5 * BLADE_WIDTH) - BOX_MARGIN;
+        let high = DVec3::new(self.length, -low.y, -low.z) + BOX_MARGIN;
+        let of = |p: &DVec3| {
+            let q = self.to_gripper.transform(*p);
+            (q.cmplt(low).bitmask() | q.cmpgt(high).bitmask() << 3) as u8
+        };
+        positions.iter().map(of).collect()
     }
 
     #[inline(always)]
@@ -199,6 +206,11 @@ impl JawRegion {
         }
         nodes
     }
+}
+
+/// Whether all corners are beyond one face of the box, and so is all that is between them.
+fn is_beside<const N: usize>(sides: &[u8], corners: &[u32; N]) -> bool {
+    corners.iter().fold(u8::MAX, |all, i| all & sides[*i as usize]) != 0
 }
 
 /// The cluster of organ `organ` that is attached when jaws close on tissue around `centroid` (m):

@@ -245,6 +245,12 @@ impl<T: Real> Panel<'_, T> {
         self.numbers[self.shape.index::<T>(self.shape.offset + row, column)]
     }
 
+    /// A band of the rows below: as many rows as a register of [`f32x16`](fearless_simd::f32x16) or
+    /// `f64x8` has lanes, column by column.
+    pub fn band_below(&self, number: usize) -> &[T] {
+        self.band(self.bands() + number)
+    }
+
     /// Writes the inverse of its triangle: `width` columns of `width` numbers, those above the
     /// diagonal 0.
     pub fn inverse(&self, level: Level, out: &mut Vec<T>) {

@@ -2,13 +2,18 @@
 
 use crate::Body;
 use crate::state::BodyState;
+use crate::threads::for_each;
 use glam::{DVec3, Vec3A};
+use std::ops::Range;
 
 /// Speed at which a node has diverged (m/s): the paper's particle velocity limit.
 pub const SPEED_LIMIT: f64 = 20.0;
 
 /// An edge of more than this many rest lengths has diverged.
 const STRETCH_LIMIT: f32 = 10.0;
+
+/// Elements or nodes that one thread measures in one go.
+const PART: usize = 6000;
 
 /// Why a run is over.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -131,33 +136,61 @@ impl Measured {
 }
 
 impl Shape {
+    /// The shape of nothing.
+    const NONE: Self = Self { finite: true, inverted: 0, min_volume_ratio: f64::INFINITY, stretched: false };
+
     fn of(body: &Body, state: &BodyState) -> Self {
-        let mut shape = Self { finite: true, inverted: 0, min_volume_ratio: f64::INFINITY, stretched: false };
         if !state.x.iter().all(|p| p.is_finite()) {
-            return Self { finite: false, ..shape };
+            return Self { finite: false, ..Self::NONE };
         }
-        let mut count = |ratio: f64| {
-            shape.inverted += usize::from(ratio <= 0.0);
-            shape.min_volume_ratio = shape.min_volume_ratio.min(ratio);
-        };
-        if let (Some(embedding), Some(lattice)) = (&body.lattice, &state.lattice) {
+        let elements = if let (Some(embedding), Some(lattice)) = (&body.lattice, &state.lattice) {
             // Tetrahedra in a lattice bear nothing; its cells do.
-            embedding.body.volume_ratios(&lattice.positions).for_each(count);
+            embedding.body.volume_ratios(&lattice.positions).fold(Self::NONE, Self::with_ratio)
         } else {
-            for (tet, rest) in body.tets.iter().zip(&body.volumes) {
-                let [a, b, c, d] = tet.map(|i| state.x[i as usize]);
-                count(f64::from((b - a).cross(c - a).dot(d - a)) / 6.0 / rest);
-            }
-        }
-        shape.stretched = (0..body.len()).any(|i| {
-            let too_long = |length: f32, j: u32| {
-                (state.x[j as usize] - state.x[i]).length_squared() > (STRETCH_LIMIT * length).powi(2)
-            };
-            // Every edge appears at both its ends.
-            body.edges_of(i).iter().any(|e| e.to as usize > i && too_long(e.length, e.to))
+            sum_of_parts(body.tets.len(), |range| {
+                let elements = body.tets[range.clone()].iter().zip(&body.volumes[range]);
+                elements.fold(Self::NONE, |shape, (tet, rest)| {
+                    let [a, b, c, d] = tet.map(|i| state.x[i as usize]);
+                    shape.with_ratio(f64::from((b - a).cross(c - a).dot(d - a)) / 6.0 / rest)
+                })
+            })
+        };
+        let edges = sum_of_parts(body.len(), |mut range| {
+            let stretched = range.any(|i| {
+                let too_long = |length: f32, j: u32| {
+                    (state.x[j as usize] - state.x[i]).length_squared() > (STRETCH_LIMIT * length).powi(2)
+                };
+                // Every edge appears at both its ends.
+                body.edges_of(i).iter().any(|e| e.to as usize > i && too_long(e.length, e.to))
+            });
+            Self { stretched, ..Self::NONE }
         });
-        shape
+        elements.with(edges)
     }
+
+    /// The same with an element of that volume ratio.
+    fn with_ratio(self, ratio: f64) -> Self {
+        let inverted = self.inverted + usize::from(ratio <= 0.0);
+        Self { inverted, min_volume_ratio: self.min_volume_ratio.min(ratio), ..self }
+    }
+
+    /// Both.
+    fn with(self, other: Self) -> Self {
+        Self {
+            finite: self.finite && other.finite,
+            inverted: self.inverted + other.inverted,
+            min_volume_ratio: self.min_volume_ratio.min(other.min_volume_ratio),
+            stretched: self.stretched || other.stretched,
+        }
+    }
+}
+
+/// The shape of `count` things, part by part on the threads of the pool that calls.
+fn sum_of_parts(count: usize, of: impl Fn(Range<usize>) -> Shape + Send + Sync) -> Shape {
+    let mut parts: Vec<(Range<usize>, Shape)> =
+        (0..count).step_by(PART).map(|first| (first..count.min(first + PART), Shape::NONE)).collect();
+    for_each(&mut parts, |(range, shape)| *shape = of(range.clone()));
+    parts.into_iter().fold(Shape::NONE, |sum, (_, shape)| sum.with(shape))
 }
 
 impl StepReport {

@@ -10,7 +10,7 @@ use super::system::System;
 use crate::contact::ContactSet;
 use crate::descent::BodyDescent;
 use crate::frame::Frame;
-use crate::lanes::{Row, dot_rows};
+use crate::lanes::{Row, dot_rows, same_rows};
 use crate::settings::{Descent, QuasiNewton, Start};
 use crate::state::BodyState;
 use crate::threads::in_parts;
@@ -220,7 +220,10 @@ impl QuasiNewtonSolver {
 
     /// Begins a substep: predicts the positions under gravity alone.
     pub fn predict(&mut self, h: f32, gravity: Row) {
-        self.iterate.start.copy_from_slice(&self.iterate.x);
+        if !same_rows(self.level, &self.iterate.start, &self.iterate.x) {
+            self.iterate.start.copy_from_slice(&self.iterate.x);
+            self.elements.dashpots.begin_elsewhere();
+        }
         // A body in free flight falls exactly: gravity's part of its motion is uniform and
         // integrated as h^2/2 g. Elsewhere implicit Euler's h^2 g.
         let reach = if !self.touching.pressed && self.flies() { 0.5 * h * h } else { h * h };

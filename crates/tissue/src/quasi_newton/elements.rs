@@ -1,14 +1,14 @@
 //! Evaluation of a body's elements: forces on their corners, and volume ratios.
 
+use super::dashpots::{BatchDashpots, Dashpots, EDGES, edge, edges};
 use super::iterate::Iterate;
 use super::layout::{Batch, Layout};
 use super::stress::{Stress, add_limit};
 use crate::Body;
-use crate::inversion_guard::{KEPT_SHARE, MIN_SQUARED_LENGTH, MIN_VOLUME_RATIO, is_squeezed};
-use crate::lanes::{LANES, Mat3L, Row, Vec3L, add, apply, cross, dot, gather, load, scale, splat, store_rows, sub};
+use crate::inversion_guard::{KEPT_SHARE, MIN_VOLUME_RATIO, is_squeezed};
+use crate::lanes::{LANES, Mat3L, Row, Vec3L, add, apply, cross, dot, load, scale, splat, store_rows, sub};
 use crate::material::{MAX_FREE_STRETCH_SQUARED, StretchEnergy};
 use fearless_simd::{Level, Simd, SimdBase, dispatch, f32x16};
-use std::collections::BTreeMap;
 use trocar_core::has_threads;
 
 /// Fewest batches that are worth a thread of their own.
@@ -27,8 +27,8 @@ pub(super) struct Elements {
     /// Whether an element may have been stretched beyond the limit in an evaluation since the
     /// stiffened elements were last sought in vain.
     pub stretched: bool,
-    /// Each element's part of the dashpots along its edges (N s/m); empty without viscosity.
-    dashpots: Vec<[[f32; LANES]; 6]>,
+    /// The dashpots along their edges.
+    pub dashpots: Dashpots,
     /// Whether the last evaluation was of a body at rest, by `evaluate_in_place`.
     pub in_place: bool,
 }
@@ -43,7 +43,7 @@ impl Elements {
             ratios: vec![[1.0; LANES]; batches],
             trial: vec![[1.0; LANES]; batches],
             stretched: false,
-            dashpots: if body.material.viscosity > 0.0 { dashpots(layout, body) } else { Vec::new() },
+            dashpots: Dashpots::new(layout, body),
             in_place: false,
         }
     }
@@ -53,7 +53,9 @@ impl Elements {
     pub fn evaluate(&mut self, level: Level, layout: &Layout, at: &Iterate, h: f32) -> bool {
         self.in_place = false;
         let Self { stress, limit, corners, ratios, trial, dashpots, .. } = self;
-        let kernel = Kernel { level, stress, limit: limit.as_ref(), at, h };
+        dashpots.refresh(level, layout, &at.start, h);
+        let kernel = Kernel { level, stress, limit: limit.as_ref(), x: &at.x };
+        let dashpots = &dashpots.batches;
         let found = kernel.evaluate(Block { batches: &layout.batches, ratios, dashpots, trial, corners });
         self.stretched |= found.stretched;
         found.squeezed
@@ -82,7 +84,7 @@ struct Block<'a> {
     batches: &'a [Batch],
     ratios: &'a [[f32; LANES]],
     /// Empty without viscosity.
-    dashpots: &'a [[[f32; LANES]; 6]],
+    dashpots: &'a [BatchDashpots],
     trial: &'a mut [[f32; LANES]],
     corners: &'a mut [Row],
 }
@@ -122,8 +124,7 @@ struct Kernel<'a> {
     level: Level,
     stress: &'a Stress,
     limit: Option<&'a StretchEnergy>,
-    at: &'a Iterate,
-    h: f32,
+    x: &'a [Row],
 }
 
 impl Kernel<'_> {
@@ -142,15 +143,14 @@ impl Kernel<'_> {
         })
     }
 
-    /// The kernel. The dashpots need where the substep began.
+    /// The kernel.
     #[inline(always)]
     fn evaluate_with<S: Simd, const VISCOUS: bool>(&self, simd: S, block: Block<'_>) -> Found {
         let Block { batches, ratios, dashpots, trial, corners } = block;
-        let Iterate { x, start, .. } = self.at;
-        let (zero, rate) = (splat(simd, 0.0), splat(simd, 1.0 / self.h));
+        let zero = splat(simd, 0.0);
         let (mut squeezed, mut stretched) = (zero, false);
         for (b, batch) in batches.iter().enumerate() {
-            let edges = edges(simd, batch, x);
+            let edges = edges(simd, batch, self.x);
             let f = deformation(simd, batch, &edges);
             let ratio = dot(f[0], cross(f[1], f[2]));
             ratio.store_slice(&mut trial[b]);
@@ -174,17 +174,9 @@ impl Kernel<'_> {
             ];
             let mut first = sub([zero; 3], add(add(forces[0], forces[1]), forces[2]));
             if VISCOUS {
-                let from = self::edges(simd, batch, start);
                 for (k, [i, j]) in EDGES.into_iter().enumerate() {
-                    // Corner 0 is the origin of the edges.
-                    let (before, now) = if i == 0 {
-                        (from[j - 1], edges[j - 1])
-                    } else {
-                        (sub(from[j - 1], from[i - 1]), sub(edges[j - 1], edges[i - 1]))
-                    };
-                    let length = simd.max_f32x16(dot(before, before), splat(simd, MIN_SQUARED_LENGTH));
-                    let along = load(simd, &dashpots[b][k]) * rate * (dot(now, now) - length) / (length + length);
-                    let force = scale(now, along);
+                    let now = edge(&edges, k);
+                    let force = scale(now, dashpots[b].along(simd, k, now));
                     forces[j - 1] = add(forces[j - 1], force);
                     if i == 0 {
                         first = sub(first, force);
@@ -209,43 +201,6 @@ impl Kernel<'_> {
 fn lack<S: Simd>(simd: S, ratio: f32x16<S>, before: f32x16<S>) -> f32x16<S> {
     let floor = simd.min_f32x16(simd.max_f32x16(before * KEPT_SHARE, splat(simd, MIN_VOLUME_RATIO)), before);
     simd.select_f32x16(simd.simd_ge_f32x16(ratio, floor), splat(simd, 0.0), splat(simd, 1.0))
-}
-
-/// The edges of an element, by corners.
-const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
-
-/// Each element's part of its edges' dashpots, by its share of the volume at the edge.
-fn dashpots(layout: &Layout, body: &Body) -> Vec<[[f32; LANES]; 6]> {
-    let vertices = |batch: &Batch, lane: usize, [i, j]: [usize; 2]| {
-        let (i, j) = (layout.vertex[batch.nodes[i][lane] as usize], layout.vertex[batch.nodes[j][lane] as usize]);
-        (i.min(j), i.max(j))
-    };
-    let mut volumes = BTreeMap::new();
-    for batch in &layout.batches {
-        for lane in 0..LANES {
-            for edge in EDGES {
-                *volumes.entry(vertices(batch, lane, edge)).or_insert(0.0) += batch.volumes[lane];
-            }
-        }
-    }
-    let part = |batch: &Batch, lane: usize, edge: [usize; 2]| {
-        let (i, j) = vertices(batch, lane, edge);
-        let whole = body.edges_of(i as usize).iter().find(|e| e.to == j).map_or(0.0, |e| e.damping);
-        whole * batch.volumes[lane] / volumes.get(&(i, j)).copied().unwrap_or(1.0)
-    };
-    let of = |batch: &Batch| EDGES.map(|edge| std::array::from_fn(|lane| part(batch, lane, edge)));
-    layout.batches.iter().map(of).collect()
-}
-
-/// Edges of a batch's elements from corner 0.
-#[inline(always)]
-fn edges<S: Simd>(simd: S, batch: &Batch, x: &[Row]) -> [Vec3L<S>; 3] {
-    let origin = gather(simd, x, &batch.nodes[0]);
-    [
-        sub(gather(simd, x, &batch.nodes[1]), origin),
-        sub(gather(simd, x, &batch.nodes[2]), origin),
-        sub(gather(simd, x, &batch.nodes[3]), origin),
-    ]
 }
 
 /// Deformation gradients of a batch.

@@ -27,8 +27,6 @@ pub(super) struct Factor {
     /// Stiffness by which tools hold nodes or supports carry them (N/m).
     pub holding: Vec<f32>,
     cholesky: Cholesky<f32>,
-    /// Scratch: the inverse of a supernode's triangle.
-    inverse: Vec<f32>,
     tiles: Tiles,
 }
 
@@ -64,7 +62,6 @@ impl Factor {
             rank,
             rest,
             cholesky,
-            inverse: Vec::new(),
             tiles: Tiles::new(),
         })
     }
@@ -105,15 +102,9 @@ impl Factor {
     }
 
     fn pack(&mut self, level: Level) {
-        let Self { cholesky, inverse, tiles, .. } = self;
-        tiles.clear();
-        for panel in cholesky.panels() {
-            let width = panel.width();
-            panel.inverse(level, inverse);
-            let rows = panel.rows().iter().copied();
-            tiles.push(level, panel.first(), width, rows, |r, c| inverse[width * c + r], |r, c| panel.below(r, c));
-        }
-        tiles.end();
+        let panels: Vec<_> = self.cholesky.panels().collect();
+        self.tiles.pack(level, &panels);
+        self.tiles.end();
     }
 
     /// Adds the product of the matrix, without what holds or carries nodes, and `x`; nodes in the

@@ -19,6 +19,7 @@
 mod apply_step;
 mod body_system;
 mod coarse;
+mod dashpots;
 mod elements;
 mod factor;
 mod half_column;
@@ -30,6 +31,7 @@ mod line_search;
 mod low_rank_update;
 mod memory;
 mod minimise;
+mod packing;
 mod resting;
 mod rigid_modes;
 mod sleep;

@@ -116,6 +116,7 @@ impl QuasiNewtonSolver {
                 (0..3).for_each(|c| y[c] += x[c] - start[c]);
                 *start = *x;
             }
+            self.elements.dashpots.begin_elsewhere();
             self.evaluate_in_place(h);
         }
     }

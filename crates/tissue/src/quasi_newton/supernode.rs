@@ -5,6 +5,11 @@ use std::ops::Range;
 /// Rows and columns of a tile.
 pub(super) const TILE_SIZE: usize = 16;
 
+/// Tiles that cover `n` numbers.
+pub(super) fn covering(n: usize) -> usize {
+    n.div_ceil(TILE_SIZE)
+}
+
 /// One supernode: columns `first..first + width` of the vector, rows below by number.
 pub(super) struct Supernode {
     pub first: usize,

@@ -4,8 +4,8 @@
 
 use super::supernode::TILE_SIZE;
 use fearless_simd::{
-    Bytes, Level, Simd, SimdBase, SimdCvtFloat, SimdCvtTruncate, SimdFloat, SimdIntWiden, SimdSplit, SimdWiden,
-    dispatch, f32x16, i8x64, i16x32, i32x16,
+    Bytes, Simd, SimdBase, SimdCvtFloat, SimdCvtTruncate, SimdFloat, SimdIntWiden, SimdSplit, SimdWiden, f32x16, i8x64,
+    i16x32, i32x16,
 };
 
 /// Greatest number in 8 bits.
@@ -32,22 +32,22 @@ impl Tile {
     pub const UNIT: f32 = MAX_INT8;
     pub const REMAINDER_UNIT: f32 = 2.0 * MAX_INT8;
 
-    /// Rounds `at(row, column)`, numbers between -1 and 1. Also returns what the rounding leaves.
-    pub fn pack(level: Level, at: impl Fn(usize, usize) -> f32) -> [Self; 2] {
-        let zero = Self { numbers: [0; TILE_SIZE * TILE_SIZE] };
-        let [mut tile, mut remainder] = [zero; 2];
-        // With the CPU's instructions for rounding.
-        dispatch!(level, _simd => for pair in 0..PAIRS {
-            for row in 0..TILE_SIZE {
-                for (second, column) in [pair, pair + PAIRS].into_iter().enumerate() {
-                    let place = 2 * (TILE_SIZE * pair + row) + second;
-                    let number = at(row, column) * Self::UNIT;
-                    let whole = number.round_ties_even();
-                    tile.numbers[place] = whole as i8;
-                    remainder.numbers[place] = ((number - whole) * Self::REMAINDER_UNIT).round_ties_even() as i8;
-                }
-            }
-        });
+    /// All zero.
+    pub const ZERO: Self = Self { numbers: [0; TILE_SIZE * TILE_SIZE] };
+
+    /// Rounds the numbers of `column(number)`, between -1 and 1. Also returns what the rounding
+    /// leaves.
+    #[inline(always)]
+    pub fn pack<S: Simd>(simd: S, column: impl Fn(usize) -> f32x16<S>) -> [Self; 2] {
+        let [mut tile, mut remainder] = [Self::ZERO; 2];
+        for pair in 0..PAIRS {
+            let [first, second] = [pair, pair + PAIRS].map(|number| column(number) * Self::UNIT);
+            let [whole, other] = [first.round_ties_even(), second.round_ties_even()];
+            let [left, right] = [first - whole, second - other].map(|x| (x * Self::REMAINDER_UNIT).round_ties_even());
+            let place = 2 * TILE_SIZE * pair..2 * TILE_SIZE * (pair + 1);
+            store_bytes(simd, [whole, other], &mut tile.numbers[place.clone()]);
+            store_bytes(simd, [left, right], &mut remainder.numbers[place]);
+        }
         [tile, remainder]
     }
 
@@ -76,6 +76,16 @@ impl Tile {
             sums[2 * q + 1] += next.pairwise_dot_product(first);
             sums[2 * q + 1 + PAIRS] += next.pairwise_dot_product(second);
         }
+    }
+}
+
+/// Stores whole numbers of two columns, row by row.
+#[inline(always)]
+fn store_bytes<S: Simd>(_simd: S, columns: [f32x16<S>; 2], out: &mut [i8]) {
+    let [first, second] = columns.map(i32x16::truncate_from);
+    let words: [i32; TILE_SIZE] = (first & 0xff | second << 8).into();
+    for (out, word) in out.as_chunks_mut::<2>().0.iter_mut().zip(words) {
+        *out = (word as i16).to_le_bytes().map(|byte| byte as i8);
     }
 }
 
@@ -139,16 +149,23 @@ pub(super) fn transpose_sum<S: Simd>(simd: S, sums: &[i32x16<S>; TILE_SIZE]) -> 
 mod tests {
     use super::{TILE_SIZE, Tile, pairs, round, transpose_sum};
     use crate::Isa;
-    use fearless_simd::{SimdBase, SimdCvtFloat, SimdCvtTruncate, dispatch, f32x16, i32x16};
+    use fearless_simd::{Level, SimdBase, SimdCvtFloat, SimdCvtTruncate, dispatch, f32x16, i32x16};
 
     fn number(row: usize, column: usize) -> f32 {
         ((37 * column + 11 * row) % 41) as f32 / 20.0 - 1.0
     }
 
+    fn packed(level: Level, at: impl Fn(usize, usize) -> f32) -> [Tile; 2] {
+        dispatch!(level, simd => Tile::pack(simd, |c| {
+            let column: [f32; TILE_SIZE] = std::array::from_fn(|r| at(r, c));
+            f32x16::from_slice(simd, &column)
+        }))
+    }
+
     #[test]
     fn both_products_are_those_of_the_numbers_up_to_their_rounding() {
         let level = Isa::detect().level();
-        let [tile, remainder] = Tile::pack(level, number);
+        let [tile, remainder] = packed(level, number);
         let x: [f32; TILE_SIZE] = std::array::from_fn(|k| (k as f32 * 0.7).sin());
         dispatch!(level, simd => {
             let vector = f32x16::from_slice(simd, &x);
@@ -176,7 +193,7 @@ mod tests {
     /// Sums in 32 bits bear tall columns of the greatest numbers, and tiny vectors are 0.
     #[test]
     fn tall_columns_do_not_overflow_and_tiny_vectors_vanish() {
-        let ones = Tile::pack(Isa::Portable.level(), |_, _| 1.0)[0];
+        let ones = packed(Isa::Portable.level(), |_, _| 1.0)[0];
         let sum = |isa: Isa, number: f32, tiles: usize| {
             dispatch!(isa.level(), simd => {
                 let mut x = vec![number; TILE_SIZE * tiles];

@@ -182,18 +182,9 @@ mod tests {
         let mut factor = Cholesky::<f32>::new(&matrix, &positions);
         let blocks = matrix.blocks().map(|(_, _, block)| block.to_cols_array_2d().map(|c| c.map(|x| x as f32)));
         assert!(factor.factorise(level, blocks));
-        let pack = |tiles: &mut Tiles| {
-            let mut inverse = Vec::new();
-            tiles.clear();
-            for panel in factor.panels() {
-                let width = panel.width();
-                panel.inverse(level, &mut inverse);
-                let rows = panel.rows().iter().copied();
-                tiles.push(level, panel.first(), width, rows, |r, c| inverse[width * c + r], |r, c| panel.below(r, c));
-            }
-        };
+        let panels: Vec<_> = factor.panels().collect();
         let mut tiles = Tiles::new();
-        pack(&mut tiles);
+        tiles.pack(level, &panels);
         let right: Vec<f32> = (0..3 * positions.len()).map(|i| ((7 * i) % 11) as f32 - 5.0).collect();
         let solve = |tiles: &mut Tiles, precise: bool| {
             let mut x = right.clone();
@@ -225,7 +216,7 @@ mod tests {
                 assert!(pool.install(|| solve(&mut tiles, precise)) == parts, "{threads} threads");
             }
             // Numbers of parts refer to the parts: the next round packs anew.
-            pack(&mut tiles);
+            tiles.pack(level, &panels);
         }
     }
 }

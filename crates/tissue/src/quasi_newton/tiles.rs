@@ -11,13 +11,15 @@
 //! The backward half is the transpose of the forward half, tile by tile. So rounding the factor
 //! leaves the preconditioner symmetric and positive definite, up to the rounding of vectors.
 
-use super::supernode::{Supernode, TILE_SIZE};
-use super::tile::{Tile, pairs, per_unit, round, transpose_sum};
+use super::packing::{Packing, sizes};
+use super::supernode::{Supernode, TILE_SIZE, covering};
+use super::tile::{Tile, pairs, round, transpose_sum};
 use super::tile_parts::{Part, Parts};
 use super::tree::Tree;
 use crate::threads::for_each;
 use fearless_simd::{Level, Simd, SimdBase, SimdCvtFloat, SimdCvtTruncate, dispatch, f32x16, i32x16};
 use std::ops::Range;
+use trocar_sparse::Panel;
 
 /// Tiles of the largest factor that is always read with its remainders.
 const MAX_SMALL: usize = 6000;
@@ -34,15 +36,8 @@ pub(super) struct Tiles {
     /// What rounding leaves of the tiles.
     remainders: Vec<Tile>,
     scales: Vec<f32>,
-    /// Room for the tiles of a supernode before they are rounded: column by column.
-    unpacked: Vec<f32>,
     /// Room for the longest column of row tiles.
     buffer: Vec<f32>,
-}
-
-/// Tiles that cover `n` numbers.
-fn covering(n: usize) -> usize {
-    n.div_ceil(TILE_SIZE)
 }
 
 impl Tiles {
@@ -55,43 +50,50 @@ impl Tiles {
             tiles: Vec::new(),
             remainders: Vec::new(),
             scales: Vec::new(),
-            unpacked: Vec::new(),
             buffer: Vec::new(),
         }
     }
 
-    /// Forgets all supernodes but keeps the memory.
-    pub fn clear(&mut self) {
+    /// Packs the panels of a factor, each on any thread of the pool that calls.
+    pub fn pack(&mut self, level: Level, panels: &[Panel<'_, f32>]) {
         self.supernodes.clear();
         self.rows.clear();
-        self.tiles.clear();
-        self.remainders.clear();
-        self.scales.clear();
+        let (mut tiles, mut scales, mut buffer) = (0, 0, 0);
+        for panel in panels {
+            let begin = self.rows.len();
+            self.rows.extend(panel.rows().iter().map(|node| 3 * node));
+            let (first, width, rows) = (panel.first(), panel.width(), begin..self.rows.len());
+            let height = 3 * rows.len();
+            self.supernodes.push(Supernode { first, width, rows, tiles, scales });
+            let [more_tiles, more_scales] = sizes(width, height);
+            (tiles, scales) = (tiles + more_tiles, scales + more_scales);
+            buffer = buffer.max(TILE_SIZE * (covering(width) + covering(height) + 1));
+        }
+        self.tiles.resize(tiles, Tile::ZERO);
+        self.remainders.resize(tiles, Tile::ZERO);
+        self.scales.resize(scales, 0.0);
+        self.buffer.resize(buffer, 0.0);
+
+        let (mut tiles, mut remainders) = (&mut self.tiles[..], &mut self.remainders[..]);
+        let mut scales = &mut self.scales[..];
+        let pack = |panel| {
+            let [count, scale_count] = sizes(Panel::width(panel), 3 * panel.rows().len());
+            let packing = Packing {
+                tiles: tiles.split_off_mut(..count)?,
+                remainders: remainders.split_off_mut(..count)?,
+                scales: scales.split_off_mut(..scale_count)?,
+            };
+            Some((panel, Some(packing)))
+        };
+        let mut tasks: Vec<_> = panels.iter().filter_map(pack).collect();
+        for_each(&mut tasks, |(panel, packing)| {
+            if let Some(packing) = packing.take() {
+                packing.pack(level, panel);
+            }
+        });
     }
 
-    /// Adds the next supernode: the inverse of its diagonal triangle, `inverse(row, column)`, and
-    /// the numbers below, `below(row, column)`; `rows` are the nodes below, ascending.
-    pub fn push(
-        &mut self,
-        level: Level,
-        first: usize,
-        width: usize,
-        rows: impl Iterator<Item = u32>,
-        inverse: impl Fn(usize, usize) -> f32,
-        below: impl Fn(usize, usize) -> f32,
-    ) {
-        let begin = self.rows.len();
-        self.rows.extend(rows.map(|node| 3 * node));
-        let height = 3 * (self.rows.len() - begin);
-        let (tiles, scales) = (self.tiles.len(), self.scales.len());
-        self.supernodes.push(Supernode { first, width, rows: begin..self.rows.len(), tiles, scales });
-        let (columns, tall) = (covering(width), covering(height));
-        self.pack(level, columns, columns, true, |r, c| if r < width && c <= r { inverse(r, c) } else { 0.0 });
-        self.pack(level, tall, columns, false, |r, c| if r < height && c < width { below(r, c) } else { 0.0 });
-        self.buffer.resize(self.buffer.len().max(TILE_SIZE * (columns + tall) + TILE_SIZE), 0.0);
-    }
-
-    /// Ends the factor after its last supernode.
+    /// Ends the factor after it is packed.
     pub fn end(&mut self) {
         self.tree = Tree::new(&self.supernodes, &self.rows, self.tiles.len());
         self.parts = Parts::cut(&self.tree, &mut self.supernodes, &mut self.rows, self.buffer.len());
@@ -107,42 +109,6 @@ impl Tiles {
     #[cfg(test)]
     pub fn parts(&self) -> usize {
         self.parts.list.len()
-    }
-
-    /// Adds `rows` x `columns` tiles of the numbers `at(row, column)`, of a `triangle` only those
-    /// from the diagonal down. Adds the scales of their columns, then those of their rows.
-    fn pack(&mut self, level: Level, rows: usize, columns: usize, triangle: bool, at: impl Fn(usize, usize) -> f32) {
-        let (height, width) = (TILE_SIZE * rows, TILE_SIZE * columns);
-        let (unpacked, scales) = (&mut self.unpacked, self.scales.len());
-        unpacked.clear();
-        self.scales.resize(scales + width + height, 0.0);
-        let (of_columns, of_rows) = self.scales[scales..].split_at_mut(width);
-        // Numbers are divided by the greatest of their column, then by the greatest of their row.
-        for (c, scale) in of_columns.iter_mut().enumerate() {
-            let begin = unpacked.len();
-            unpacked.extend((0..height).map(|r| at(r, c)));
-            let column = &mut unpacked[begin..];
-            *scale = column.iter().fold(0.0, |most: f32, x| most.max(x.abs()));
-            let per_unit = per_unit(*scale, 1.0);
-            for (x, most) in column.iter_mut().zip(&mut *of_rows) {
-                *x *= per_unit;
-                *most = most.max(x.abs());
-            }
-        }
-        let per_unit: Vec<f32> = of_rows.iter().map(|most| per_unit(*most, 1.0)).collect();
-        for j in 0..columns {
-            for i in if triangle { j } else { 0 }..rows {
-                let [tile, remainder] = Tile::pack(level, |r, c| {
-                    let (r, c) = (TILE_SIZE * i + r, TILE_SIZE * j + c);
-                    unpacked[height * c + r] * per_unit[r]
-                });
-                self.tiles.push(tile);
-                self.remainders.push(remainder);
-            }
-        }
-        for scale in of_rows {
-            *scale /= Tile::UNIT;
-        }
     }
 
     /// Solves L y = x in place: `x` is three numbers a node in the order of elimination, padded by
