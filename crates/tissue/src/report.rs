@@ -2,7 +2,7 @@
 
 use crate::Body;
 use crate::state::BodyState;
-use crate::threads::for_each;
+use crate::threads::in_parts;
 use glam::{DVec3, Vec3A};
 use std::ops::Range;
 
@@ -12,8 +12,9 @@ pub const SPEED_LIMIT: f64 = 20.0;
 /// An edge of more than this many rest lengths has diverged.
 const STRETCH_LIMIT: f32 = 10.0;
 
-/// Elements or nodes that one thread measures in one go.
-const PART: usize = 6000;
+/// Elements or nodes that are worth a thread of their own, and the most parts of them.
+const MIN_PART: usize = 6000;
+const MAX_PARTS: usize = 8;
 
 /// Why a run is over.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -187,10 +188,14 @@ impl Shape {
 
 /// The shape of `count` things, part by part on the threads of the pool that calls.
 fn sum_of_parts(count: usize, of: impl Fn(Range<usize>) -> Shape + Send + Sync) -> Shape {
-    let mut parts: Vec<(Range<usize>, Shape)> =
-        (0..count).step_by(PART).map(|first| (first..count.min(first + PART), Shape::NONE)).collect();
-    for_each(&mut parts, |(range, shape)| *shape = of(range.clone()));
-    parts.into_iter().fold(Shape::NONE, |sum, (_, shape)| sum.with(shape))
+    let mut parts = [Shape::NONE; MAX_PARTS];
+    let used = (count / MIN_PART).clamp(1, MAX_PARTS);
+    in_parts(&mut parts[..used], 1, |first, parts| {
+        for (k, part) in (first..).zip(parts) {
+            *part = of(count * k / used..count * (k + 1) / used);
+        }
+    });
+    parts.into_iter().fold(Shape::NONE, Shape::with)
 }
 
 impl StepReport {

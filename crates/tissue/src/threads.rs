@@ -1,16 +1,38 @@
 //! Work on the threads of the pool that calls. Outside of a pool the caller does all the work: the
 //! global pool is not for it. How work is divided does not depend on the threads.
+//!
+//! A step has hundreds of short sections that several threads share. A thread of a pool falls asleep
+//! soon after it has no work, and to wake it takes as long as a section does. So after a section the
+//! other threads linger for a while.
 
 use rayon::prelude::*;
+use std::cell::Cell;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 use trocar_core::has_threads;
 
 /// Parts that items are divided into, at most.
 const MAX_PARTS: usize = 8;
 
+/// How long a thread waits awake for the next section.
+const LINGER: Duration = Duration::from_micros(200);
+
+/// Pauses of the processor between two looks for work.
+const PAUSES: usize = 16;
+
+thread_local! {
+    /// Threads that linger for this one's sections.
+    static LINGERING: Arc<AtomicUsize> = Arc::default();
+    /// Whether this thread lingers.
+    static LINGERS: Cell<bool> = const { Cell::new(false) };
+}
+
 /// Calls `work` with every item.
 pub(crate) fn for_each<T: Send>(items: &mut [T], work: impl Fn(&mut T) + Send + Sync) {
-    if has_threads() {
+    if items.len() > 1 && has_threads() {
         items.par_iter_mut().with_max_len(1).for_each(work);
+        keep_awake();
     } else {
         items.iter_mut().for_each(work);
     }
@@ -25,4 +47,38 @@ pub(crate) fn in_parts<T: Send>(items: &mut [T], least: usize, work: impl Fn(usi
     }
     let size = items.len().div_ceil(parts);
     items.par_chunks_mut(size).enumerate().for_each(|(k, part)| work(k * size, part));
+    keep_awake();
+}
+
+/// Lets the other threads of the pool wait awake for the caller's next section.
+pub(crate) fn keep_awake() {
+    let Some(owner) = rayon::current_thread_index() else { return };
+    LINGERING.with(|lingering| {
+        let others = (rayon::current_num_threads() - 1).min(MAX_PARTS - 1);
+        if lingering.load(Ordering::Relaxed) < others {
+            lingering.fetch_add(1, Ordering::Relaxed);
+            let lingering = lingering.clone();
+            rayon::spawn(move || {
+                if rayon::current_thread_index() != Some(owner) {
+                    linger();
+                }
+                lingering.fetch_sub(1, Ordering::Relaxed);
+            });
+        }
+    });
+}
+
+/// Does what work there is until there has been none for a while.
+fn linger() {
+    if LINGERS.replace(true) {
+        return;
+    }
+    let mut last = Instant::now();
+    while last.elapsed() < LINGER {
+        match rayon::yield_now() {
+            Some(rayon::Yield::Executed) => last = Instant::now(),
+            _ => (0..PAUSES).for_each(|_| std::hint::spin_loop()),
+        }
+    }
+    LINGERS.set(false);
 }
