@@ -33,8 +33,8 @@ pub struct QuasiNewton {
     pub iterations: usize,
     /// Pairs that L-BFGS keeps.
     pub memory: usize,
-    /// A correction this small ends a substep (m). A body whose first correction is no larger is at
-    /// rest.
+    /// A correction this small ends a substep (m). A body that goes no farther freely, and whose
+    /// correction is no larger, is at rest.
     pub tolerance: f64,
     /// A correction this small over the way that the substep's corrections went so far ends it,
     /// too.

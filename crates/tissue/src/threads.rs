@@ -21,18 +21,22 @@ const LINGER: Duration = Duration::from_micros(200);
 /// Pauses of the processor between two looks for work.
 const PAUSES: usize = 16;
 
+/// Looks for work between two offers of the core to other programs.
+const LOOKS: usize = 64;
+
 thread_local! {
     /// Threads that linger for this one's sections.
     static LINGERING: Arc<AtomicUsize> = Arc::default();
     /// Whether this thread lingers.
     static LINGERS: Cell<bool> = const { Cell::new(false) };
+    /// Sections that this thread is inside of. While it waits for one it must not linger.
+    static SECTIONS: Cell<usize> = const { Cell::new(0) };
 }
 
 /// Calls `work` with every item.
 pub(crate) fn for_each<T: Send>(items: &mut [T], work: impl Fn(&mut T) + Send + Sync) {
     if items.len() > 1 && has_threads() {
-        items.par_iter_mut().with_max_len(1).for_each(work);
-        keep_awake();
+        section(|| items.par_iter_mut().with_max_len(1).for_each(work));
     } else {
         items.iter_mut().for_each(work);
     }
@@ -46,12 +50,25 @@ pub(crate) fn in_parts<T: Send>(items: &mut [T], least: usize, work: impl Fn(usi
         return work(0, items);
     }
     let size = items.len().div_ceil(parts);
-    items.par_chunks_mut(size).enumerate().for_each(|(k, part)| work(k * size, part));
+    section(|| items.par_chunks_mut(size).enumerate().for_each(|(k, part)| work(k * size, part)));
+}
+
+/// Does both, on two threads of the pool that calls if both are free.
+pub(crate) fn join<A: Send, B: Send>(first: impl FnOnce() -> A + Send, second: impl FnOnce() -> B + Send) -> (A, B) {
+    section(|| rayon::join(first, second))
+}
+
+/// Does `work` that several threads share, and keeps them awake for the next.
+fn section<R>(work: impl FnOnce() -> R) -> R {
+    SECTIONS.set(SECTIONS.get() + 1);
+    let result = work();
+    SECTIONS.set(SECTIONS.get() - 1);
     keep_awake();
+    result
 }
 
 /// Lets the other threads of the pool wait awake for the caller's next section.
-pub(crate) fn keep_awake() {
+fn keep_awake() {
     let Some(owner) = rayon::current_thread_index() else { return };
     LINGERING.with(|lingering| {
         let others = (rayon::current_num_threads() - 1).min(MAX_PARTS - 1);
@@ -70,13 +87,17 @@ pub(crate) fn keep_awake() {
 
 /// Does what work there is until there has been none for a while.
 fn linger() {
-    if LINGERS.replace(true) {
+    if SECTIONS.get() > 0 || LINGERS.replace(true) {
         return;
     }
     let mut last = Instant::now();
+    let mut looks = 0;
     while last.elapsed() < LINGER {
+        looks += 1;
         match rayon::yield_now() {
             Some(rayon::Yield::Executed) => last = Instant::now(),
+            // Other programs may have work for the core.
+            _ if looks % LOOKS == 0 => std::thread::yield_now(),
             _ => (0..PAUSES).for_each(|_| std::hint::spin_loop()),
         }
     }

@@ -40,7 +40,7 @@ pub(super) enum ConstraintMotion {
 
 impl QuasiNewtonSolver {
     /// Moves to the start of the search, and evaluates the elements there. A body of which no node
-    /// goes farther than `still` (m) starts where it is.
+    /// goes farther than `still` (m) and that no tool carries starts where it is.
     pub(super) fn start_substep(
         &mut self,
         frame: &Frame<'_>,

@@ -4,7 +4,7 @@
 //! c (l^2 - l0^2)^2 / (8 h l0^2), whose force along the edge e is c (l^2 - l0^2) / (2 h l0^2) e. All
 //! but l and e are constants of the substep.
 
-use super::layout::{Batch, Layout};
+use super::layout::{Batch, Layout, MIN_BATCHES};
 use crate::Body;
 use crate::inversion_guard::MIN_SQUARED_LENGTH;
 use crate::lanes::{LANES, Row, Vec3L, dot, gather, load, splat, sub};
@@ -14,9 +14,6 @@ use std::collections::BTreeMap;
 
 /// The edges of an element, by corners. Corner 0 is the origin of the edges.
 pub(super) const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
-
-/// Fewest batches that are worth a thread of their own.
-const MIN_BATCHES: usize = 600;
 
 /// Dashpots of sixteen elements in a substep, edge by edge.
 #[derive(Clone)]

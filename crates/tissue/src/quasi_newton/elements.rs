@@ -2,17 +2,15 @@
 
 use super::dashpots::{BatchDashpots, Dashpots, EDGES, edge, edges};
 use super::iterate::Iterate;
-use super::layout::{Batch, Layout};
+use super::layout::{Batch, Layout, MIN_BATCHES};
 use super::stress::{Stress, add_limit};
 use crate::Body;
 use crate::inversion_guard::{KEPT_SHARE, MIN_VOLUME_RATIO, is_squeezed};
 use crate::lanes::{LANES, Mat3L, Row, Vec3L, add, apply, cross, dot, load, scale, splat, store_rows, sub};
 use crate::material::{MAX_FREE_STRETCH_SQUARED, StretchEnergy};
+use crate::threads::join;
 use fearless_simd::{Level, Simd, SimdBase, dispatch, f32x16};
 use trocar_core::has_threads;
-
-/// Fewest batches that are worth a thread of their own.
-const MIN_BATCHES: usize = 600;
 
 /// Forces and volume ratios of the elements.
 pub(super) struct Elements {
@@ -133,7 +131,7 @@ impl Kernel<'_> {
         let count = block.batches.len();
         if count >= 2 * MIN_BATCHES && has_threads() {
             let (first, second) = block.split(count / 2);
-            let (a, b) = rayon::join(|| self.evaluate(first), || self.evaluate(second));
+            let (a, b) = join(|| self.evaluate(first), || self.evaluate(second));
             return Found { squeezed: a.squeezed || b.squeezed, stretched: a.stretched || b.stretched };
         }
         dispatch!(self.level, simd => if block.dashpots.is_empty() {

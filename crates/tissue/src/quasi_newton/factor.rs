@@ -123,7 +123,7 @@ impl Factor {
     }
 
     /// The first half of a solve in place: three numbers a node in the order of elimination. `x` is
-    /// at least 16 numbers longer, finite. The factor of a large body is rounded to 8 bits unless
+    /// at least 16 numbers longer, finite. The factor is rounded to 8 bits unless
     /// the solve is `precise`.
     #[inline(always)]
     pub fn forward<S: Simd>(&mut self, simd: S, x: &mut [f32], precise: bool) {

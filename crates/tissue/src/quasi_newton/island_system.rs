@@ -8,7 +8,8 @@ use glam::Vec3A;
 /// Friction that changes by this share of the largest limit has another minimum.
 const LIMIT_SHARE: f32 = 0.02;
 
-/// A body at rest is in equilibrium up to this share of its weight.
+/// A body at rest is off its equilibrium by at most this share of its weight, or, where it is stiff,
+/// of the way that it would fall in a substep.
 const STILL_SHARE: f32 = 1e-4;
 
 /// Bodies that may touch each other, in a frame.
@@ -95,11 +96,11 @@ impl IslandSystem<'_> {
         (self.slots[0].solver.settings.tolerance as f32).max(self.rounding())
     }
 
-    /// What a body at rest may go in a substep, and be off its equilibrium (m): a small share of
-    /// what gravity would move it, but no less than rounding.
+    /// What a body that comes to rest may go in a substep, and be off its equilibrium (m): what ends
+    /// a search, or a small share of what gravity would move it.
     pub fn still(&mut self) -> f32 {
         let fall = self.h * self.h * self.frame.gravity.length() as f32;
-        if fall > 0.0 { (STILL_SHARE * fall).max(self.rounding()) } else { self.tolerance() }
+        self.tolerance().max(STILL_SHARE * fall)
     }
 
     /// Rounding of positions (m).

@@ -7,6 +7,9 @@ use crate::body::BoundVertex;
 use crate::lanes::{LANES, Row};
 use glam::{DVec3, Vec3A};
 
+/// Fewest batches that are worth a thread of their own.
+pub(super) const MIN_BATCHES: usize = 600;
+
 /// Sixteen elements.
 #[derive(Clone)]
 #[repr(C, align(64))]

@@ -137,12 +137,12 @@ impl IslandSystem<'_> {
     /// Lets a single body stay where it is, if it is at rest.
     fn rest_alone(&mut self, still: f32) {
         let h = self.h;
-        if let [BodySlot { solver, .. }] = self.slots
+        if let [BodySlot { solver, report, .. }] = self.slots
             && solver.progress.guess == InitialGuess::Still
             && solver.is_quiet(h, still)
             && solver.correction_at_rest() <= still
         {
-            solver.settle(h);
+            report.iterations += solver.settle(h);
             solver.leave_at_rest(h);
         }
     }

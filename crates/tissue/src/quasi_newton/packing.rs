@@ -5,7 +5,10 @@
 use super::supernode::{TILE_SIZE, covering};
 use super::tile::{Tile, per_unit};
 use fearless_simd::{Level, Simd, SimdBase, dispatch, f32x16};
-use trocar_sparse::Panel;
+use trocar_sparse::{Panel, Real};
+
+// A band of a panel is a row of tiles.
+const _: () = assert!(<f32 as Real>::LANES == TILE_SIZE);
 
 /// 16 x 16 numbers, column by column.
 type Unpacked = [f32; TILE_SIZE * TILE_SIZE];
@@ -56,8 +59,8 @@ impl Packing<'_> {
             let inside = TILE_SIZE * (width - TILE_SIZE * j).min(TILE_SIZE);
             tile[..inside].copy_from_slice(&panel.band_below(i)[TILE_SIZE * TILE_SIZE * j..][..inside]);
             tile[inside..].fill(0.0);
-            let tall = (height - TILE_SIZE * i).min(TILE_SIZE);
-            tile.chunks_exact_mut(TILE_SIZE).for_each(|column| column[tall..].fill(0.0));
+            let rows = (height - TILE_SIZE * i).min(TILE_SIZE);
+            tile.chunks_exact_mut(TILE_SIZE).for_each(|column| column[rows..].fill(0.0));
         }
         let block = Block { rows: tall, columns, triangle: false };
         let below = Packing { tiles: tiles_below, remainders: remainders_below, scales: scales_below };
@@ -65,7 +68,7 @@ impl Packing<'_> {
     }
 }
 
-/// The shape of a block of tiles, which are column of tiles by column of tiles.
+/// The shape of a block of tiles. They lie column by column.
 struct Block {
     rows: usize,
     columns: usize,

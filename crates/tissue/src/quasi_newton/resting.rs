@@ -54,8 +54,7 @@ impl QuasiNewtonSolver {
         !self.progress.carried && self.farthest_free_motion(h) <= way
     }
 
-    /// The largest coordinate of the free motion of a node in a substep of `h` (m). Held nodes have
-    /// no velocity.
+    /// The largest coordinate of the free motion of a node in a substep of `h` (m).
     pub fn farthest_free_motion(&self, h: f32) -> f32 {
         h * dispatch!(self.level, _simd => max_coordinate(&self.iterate.v))
     }
@@ -86,39 +85,57 @@ impl QuasiNewtonSolver {
         correction
     }
 
-    /// Brings a body that comes to rest into equilibrium, as exactly as rounding lets it. One that
-    /// already is at rest, without velocity, stays where it is.
-    pub fn settle(&mut self, h: f32) {
+    /// Brings a body that comes to rest into equilibrium, as exactly as rounding lets it. Returns
+    /// the number of steps. One that already is at rest, without velocity, stays where it is.
+    pub fn settle(&mut self, h: f32) -> usize {
         if self.iterate.v.as_flattened().iter().all(|v| *v == 0.0) {
-            return;
+            return 0;
         }
-        let free = self.layout.free;
         self.drop_velocity(h);
+        self.update_stiffened();
         self.update_contacts();
-        let mut last = f32::INFINITY;
-        for _ in 0..MAX_SETTLING_STEPS {
-            self.take_gradient(h);
-            self.accept_gradient();
-            let correction = self.correction();
-            if correction > MAX_SETTLING_RATIO * last {
-                break;
+        let mut last = self.correction_here(h);
+        for step in 0..MAX_SETTLING_STEPS {
+            if last == 0.0 {
+                return step;
             }
-            last = correction;
             self.turn_downhill();
             let Iterate { base, x, .. } = &mut self.iterate;
             base.copy_from_slice(&x[..self.layout.rows]);
             if !self.apply_step(1.0, h) {
-                break;
+                return step;
             }
-            self.elements.accept();
-            let Iterate { predictor, start, x, .. } = &mut self.iterate;
-            for ((y, start), x) in predictor.iter_mut().zip(start).zip(&x[..free]) {
-                (0..3).for_each(|c| y[c] += x[c] - start[c]);
-                *start = *x;
+            self.begin_here(h);
+            let next = self.correction_here(h);
+            if next >= last {
+                let (free, Iterate { base, x, .. }) = (self.layout.free, &mut self.iterate);
+                x[..free].copy_from_slice(&base[..free]);
+                self.begin_here(h);
             }
-            self.elements.dashpots.begin_elsewhere();
-            self.evaluate_in_place(h);
+            if next > MAX_SETTLING_RATIO * last {
+                return step + 1;
+            }
+            last = next;
         }
+        MAX_SETTLING_STEPS
+    }
+
+    /// The largest motion of a node by the forces where the body is (m).
+    fn correction_here(&mut self, h: f32) -> f32 {
+        self.take_gradient(h);
+        self.accept_gradient();
+        self.correction()
+    }
+
+    /// Begins the substep where the body is.
+    fn begin_here(&mut self, h: f32) {
+        let Iterate { predictor, start, x, .. } = &mut self.iterate;
+        for ((y, start), x) in predictor.iter_mut().zip(start).zip(&x[..self.layout.free]) {
+            (0..3).for_each(|c| y[c] += x[c] - start[c]);
+            *start = *x;
+        }
+        self.elements.dashpots.begin_elsewhere();
+        self.evaluate_in_place(h);
     }
 
     /// Drops the velocities and their part of the predictor.

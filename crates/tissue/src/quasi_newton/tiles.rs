@@ -2,11 +2,11 @@
 //!
 //! A solve reads the whole factor twice and does one multiplication a number: it is bound by
 //! memory. So the factor is kept in 8 bits a number, in tiles of 16 x 16 numbers, supernode by
-//! supernode. What that rounding leaves is kept in 8 bits more, apart: precise solves read both,
-//! and so do all solves with a small factor, which stays in a cache. A number has two scales: its
-//! row's and its column's in the supernode. The triangle on a supernode's diagonal is kept as its
-//! inverse: a solve consists of products with tiles and waits for no division. Vectors are rounded
-//! to 16 bits before they are multiplied, because processors multiply whole numbers faster.
+//! supernode. What that rounding leaves is kept in 8 bits more, apart, for precise solves. A number
+//! has two scales: its row's and its column's in the supernode. The triangle on a supernode's
+//! diagonal is kept as its inverse: a solve consists of products with tiles and waits for no
+//! division. Vectors are rounded to 16 bits before they are multiplied, because processors multiply
+//! whole numbers faster.
 //!
 //! The backward half is the transpose of the forward half, tile by tile. So rounding the factor
 //! leaves the preconditioner symmetric and positive definite, up to the rounding of vectors.
@@ -20,9 +20,6 @@ use crate::threads::for_each;
 use fearless_simd::{Level, Simd, SimdBase, SimdCvtFloat, SimdCvtTruncate, dispatch, f32x16, i32x16};
 use std::ops::Range;
 use trocar_sparse::Panel;
-
-/// Tiles of the largest factor that is always read with its remainders.
-const MAX_SMALL: usize = 6000;
 
 /// The packed factor.
 pub(super) struct Tiles {
@@ -115,7 +112,6 @@ impl Tiles {
     /// at least 16. A `precise` solve has 16 bits of each number of the factor, another may have 8.
     #[inline(always)]
     pub fn forward<S: Simd>(&mut self, simd: S, x: &mut [f32], precise: bool) {
-        let precise = precise || self.is_small();
         let (mut buffer, mut parts) = (std::mem::take(&mut self.buffer), std::mem::take(&mut self.parts));
         let (whole, level) = (&*x, simd.level());
         for_each(&mut parts.list, |part| {
@@ -139,7 +135,6 @@ impl Tiles {
     /// Solves L' x = y in place; as precise as the forward half.
     #[inline(always)]
     pub fn backward<S: Simd>(&mut self, simd: S, x: &mut [f32], precise: bool) {
-        let precise = precise || self.is_small();
         let (mut buffer, mut parts) = (std::mem::take(&mut self.buffer), std::mem::take(&mut self.parts));
         for s in parts.above.iter().rev() {
             self.substitute(simd, &self.supernodes[*s], x, &mut buffer, precise);
@@ -252,11 +247,6 @@ impl Tiles {
         let (rows, rest) = rest.split_at(width);
         let (under, below) = rest.split_at(width);
         [Scales { columns, rows }, Scales { columns: under, rows: below }]
-    }
-
-    /// Whether a factor is always read with its remainders.
-    fn is_small(&self) -> bool {
-        self.tiles.len() <= MAX_SMALL
     }
 
     /// Adds to `sums` the products of a column of tiles, the first of them at `at`, with `y` times
