@@ -27,8 +27,8 @@ pub(crate) trait Solver: Send + Sync + Sized {
     fn begin_frame(_island: &mut IslandFrame<'_, Self>) {}
 
     /// Advances the bodies of an island from one share (0..=1) of the frame to another, and writes
-    /// what happened into their reports. It allocates nothing but longer lists of contacts, and tasks for
-    /// other threads.
+    /// what happened into their reports. It allocates nothing but longer lists of contacts, and
+    /// tasks for other threads.
     fn substep(island: &mut IslandFrame<'_, Self>, from: f64, to: f64);
 
     /// Ends the frame: the states are those at its end.

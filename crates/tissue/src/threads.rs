@@ -1,9 +1,9 @@
 //! Work on the threads of the pool that calls. Outside of a pool the caller does all the work: the
 //! global pool is not for it. How work is divided does not depend on the threads.
 //!
-//! A step has hundreds of short sections that several threads share. A thread of a pool falls asleep
-//! soon after it has no work, and to wake it takes as long as a section does. So after a section the
-//! other threads linger for a while.
+//! A step has hundreds of short sections that several threads share. A thread of a pool falls
+//! asleep soon after it has no work, and to wake it takes as long as a section does. So after a
+//! section the other threads linger for a while.
 
 use rayon::prelude::*;
 use std::cell::Cell;

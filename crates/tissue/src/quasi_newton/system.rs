@@ -175,8 +175,8 @@ impl System {
         warp.update(level, layout, x);
     }
 
-    /// direction = P^-1 direction, P being the stiffness at rest turned with the tissue; to some per
-    /// cent unless `precise`.
+    /// direction = P^-1 direction, P being the stiffness at rest turned with the tissue; to some
+    /// per cent unless `precise`.
     pub fn apply(&mut self, level: Level, direction: &mut [Row], precise: bool) {
         let Self { warp, factor, update, right, .. } = self;
         let Some(factor) = factor else { return };
