@@ -245,8 +245,7 @@ impl<T: Real> Panel<'_, T> {
         self.numbers[self.shape.index::<T>(self.shape.offset + row, column)]
     }
 
-    /// A band of the rows below: as many rows as a register of [`f32x16`](fearless_simd::f32x16) or
-    /// `f64x8` has lanes, column by column.
+    /// A band of the rows below: [`Real::LANES`] rows, column by column.
     pub fn band_below(&self, number: usize) -> &[T] {
         self.band(self.bands() + number)
     }

@@ -1,8 +1,11 @@
 //! The dashpots along the edges of elements.
 //!
-//! An edge of length l that was l0 long where the substep of h began has the energy c (l^2 -
-//! l0^2)^2 / (8 h l0^2), whose force along the edge e is c (l^2 - l0^2) / (2 h l0^2) e. All but l
-//! and e are constants of the substep.
+//! An edge e of length l had the length l0 where the substep of h began. With a dashpot c its energy
+//! and its force are
+//!
+//!     c (l^2 - l0^2)^2 / (8 h l0^2),    c (l^2 - l0^2) / (2 h l0^2) e.
+//!
+//! All but l and e are constants of the substep.
 
 use super::layout::{Batch, Layout, MIN_BATCHES};
 use crate::Body;

@@ -8,8 +8,7 @@ use glam::Vec3A;
 /// Friction that changes by this share of the largest limit has another minimum.
 const LIMIT_SHARE: f32 = 0.02;
 
-/// A body at rest is off its equilibrium by at most this share of its weight, or, where it is
-/// stiff, of the way that it would fall in a substep.
+/// The correction of a body at rest is at most this share of its free fall in a substep.
 const STILL_SHARE: f32 = 1e-4;
 
 /// Bodies that may touch each other, in a frame.
@@ -96,8 +95,8 @@ impl IslandSystem<'_> {
         (self.slots[0].solver.settings.tolerance as f32).max(self.rounding())
     }
 
-    /// What a body that comes to rest may go in a substep, and be off its equilibrium (m): what
-    /// ends a search, or a small share of what gravity would move it.
+    /// A body comes to rest if it goes no farther freely in a substep, and its correction is no
+    /// larger (m). It is a small share of a free fall, but at least the tolerance.
     pub fn still(&mut self) -> f32 {
         let fall = self.h * self.h * self.frame.gravity.length() as f32;
         self.tolerance().max(STILL_SHARE * fall)

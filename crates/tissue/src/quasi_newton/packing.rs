@@ -29,7 +29,7 @@ pub(super) fn sizes(width: usize, height: usize) -> [usize; 2] {
 
 impl Packing<'_> {
     /// Packs the inverse of the panel's triangle, then the numbers below it.
-    pub fn pack(self, level: Level, panel: &Panel<'_, f32>) {
+    pub fn pack(&mut self, level: Level, panel: &Panel<'_, f32>) {
         let (width, height) = (panel.width(), 3 * panel.rows().len());
         let (columns, tall) = (covering(width), covering(height));
         let Self { tiles, remainders, scales } = self;

@@ -85,8 +85,8 @@ impl QuasiNewtonSolver {
         correction
     }
 
-    /// Brings a body that comes to rest into equilibrium, as exactly as rounding lets it. Returns
-    /// the number of steps. One that already is at rest, without velocity, stays where it is.
+    /// Brings a body that comes to rest near its equilibrium, until corrections hardly shrink.
+    /// Returns the number of steps. A body without velocity is at rest and stays where it is.
     pub fn settle(&mut self, h: f32) -> usize {
         if self.iterate.v.as_flattened().iter().all(|v| *v == 0.0) {
             return 0;

@@ -80,14 +80,10 @@ impl Tiles {
                 remainders: remainders.split_off_mut(..count)?,
                 scales: scales.split_off_mut(..scale_count)?,
             };
-            Some((panel, Some(packing)))
+            Some((panel, packing))
         };
         let mut tasks: Vec<_> = panels.iter().filter_map(pack).collect();
-        for_each(&mut tasks, |(panel, packing)| {
-            if let Some(packing) = packing.take() {
-                packing.pack(level, panel);
-            }
-        });
+        for_each(&mut tasks, |(panel, packing)| packing.pack(level, panel));
     }
 
     /// Ends the factor after it is packed.
