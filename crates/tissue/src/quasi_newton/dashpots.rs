@@ -3,7 +3,9 @@
 //! An edge e of length l had the length l0 where the substep of h began. With a dashpot c, its
 //! energy and its force are
 //!
-//!     c (l^2 - l0^2)^2 / (8 h l0^2),    c (l^2 - l0^2) / (2 h l0^2) e.
+//! ```text
+//! c (l^2 - l0^2)^2 / (8 h l0^2),    c (l^2 - l0^2) / (2 h l0^2) e.
+//! ```
 //!
 //! All but l and e are constants of the substep.
 
