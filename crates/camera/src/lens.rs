@@ -39,6 +39,15 @@ impl CameraModel {
         }
     }
 
+    /// The camera with `times` as many pixels along each side, for the same picture.
+    #[must_use]
+    pub fn finer(&self, times: usize) -> Self {
+        match self {
+            Self::Pinhole(camera) => Self::Pinhole(camera.finer(times)),
+            Self::Fisheye(camera, lens) => Self::Fisheye(camera.finer(times), *lens),
+        }
+    }
+
     /// Checks the parameters as [`Camera::validate`] does, and the coefficients of a fisheye lens.
     ///
     /// # Errors

@@ -58,6 +58,21 @@ impl Camera {
         Self::centred(848, 480, 87.0_f64.to_radians())
     }
 
+    /// The camera with `times` as many pixels along each side, for the same picture.
+    #[must_use]
+    pub fn finer(&self, times: usize) -> Self {
+        let k = times as f64;
+        Self {
+            width: times * self.width,
+            height: times * self.height,
+            fx: k * self.fx,
+            fy: k * self.fy,
+            cx: (self.cx + 0.5) * k - 0.5,
+            cy: (self.cy + 0.5) * k - 0.5,
+            distortion: self.distortion,
+        }
+    }
+
     /// Checks the parameters.
     ///
     /// # Errors

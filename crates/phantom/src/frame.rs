@@ -124,18 +124,10 @@ impl Window {
         })
     }
 
-    /// The camera of this window, with `finer` times as many pixels per side.
-    fn camera(&self, whole: &Camera, finer: usize) -> Camera {
-        let k = finer as f64;
-        Camera {
-            width: self.width * finer,
-            height: self.height * finer,
-            fx: whole.fx * k,
-            fy: whole.fy * k,
-            cx: (whole.cx - self.u as f64 + 0.5) * k - 0.5,
-            cy: (whole.cy - self.v as f64 + 0.5) * k - 0.5,
-            distortion: whole.distortion,
-        }
+    /// The camera of this window.
+    fn camera(&self, whole: &Camera) -> Camera {
+        let (cx, cy) = (whole.cx - self.u as f64, whole.cy - self.v as f64);
+        Camera { width: self.width, height: self.height, cx, cy, ..*whole }
     }
 
     /// Draws the layer in front of the canvas. Its rim is blended by the share of rays that hit.
@@ -143,8 +135,9 @@ impl Window {
         let Canvas { color, depth, facing, instruments } = canvas;
         let Layer { mesh, shading, instrument } = layer;
         let scene = PhongScene::new(vec![Instance { mesh, label: 1, shading }], None, [0; 3]);
-        let centres = scene.render(&self.camera(camera, 1), &Pose::IDENTITY, 1);
-        let fine = scene.render(&self.camera(camera, SAMPLES), &Pose::IDENTITY, 1);
+        let own = self.camera(camera);
+        let centres = scene.render(&own, &Pose::IDENTITY, 1);
+        let fine = scene.render(&own.finer(SAMPLES), &Pose::IDENTITY, 1);
         for v in 0..self.height {
             for u in 0..self.width {
                 let (x, y) = (self.u + u, self.v + v);

@@ -23,6 +23,8 @@ const REST: u32 = 8;
 pub(crate) struct Memory {
     /// Of the picture that is being made.
     pub visibility: Visibility,
+    /// Of the points of its pixels, where edges are smooth.
+    pub points: Visibility,
     /// The camera that was used last comes last.
     cameras: Vec<Background>,
 }

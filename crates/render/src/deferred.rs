@@ -1,5 +1,6 @@
 //! Direct light on what was rasterised: eight pixels of a body at a time.
 
+use crate::antialias::Marks;
 use crate::background::Behind;
 use crate::bvh::Stacks;
 use crate::direct::{BESIDE_EYE_SHARE, SHADOW_RAY_END};
@@ -51,6 +52,8 @@ pub(crate) struct Shading<'a> {
     pub shadows: bool,
     /// What the rows hold already.
     pub behind: Option<Behind<'a>>,
+    /// The pixels to shade; `None` for all.
+    pub marks: Option<&'a Marks>,
 }
 
 impl Buffers {
@@ -77,7 +80,7 @@ pub(crate) fn may_cast(stage: &Stage, eye: Vec3A, least: f32) -> bool {
 impl<'a> Shading<'a> {
     /// Of all pixels, without shadows.
     pub fn new(stage: &'a Stage, view: &'a View<'a>) -> Self {
-        Self { stage, view, shadows: false, behind: None }
+        Self { stage, view, shadows: false, behind: None, marks: None }
     }
 
     /// Shades the rows of a picture from row `first`.
@@ -102,7 +105,9 @@ impl<'a> Shading<'a> {
                 while row < count.min(top + TILE) {
                     let part =
                         Part { at: row * stride + left, ray: (first + row) * stride + left, to: row * width + left };
-                    let fresh = self.fresh(simd, part, LANES.min(width - left), seen);
+                    let within = (1 << LANES.min(width - left)) - 1;
+                    let wanted = self.marks.map_or(within, |marks| marks.at(first + row, left) & within);
+                    let fresh = self.fresh(simd, part, wanted, seen);
                     if fresh != 0 {
                         buffers.shaded[row * parts + left / LANES] = true;
                         self.pixels(simd, fresh, part, seen, rows, &mut body, buffers);
@@ -118,14 +123,13 @@ impl<'a> Shading<'a> {
         }
     }
 
-    /// Which of the first `count` pixels of a part are not as those behind.
+    /// Which of the `wanted` pixels of a part are not as those behind.
     #[inline(always)]
-    fn fresh<S: Simd>(&self, simd: S, Part { at, ray, .. }: Part, count: usize, seen: &Seen<'_>) -> u64 {
-        let within = (1 << count) - 1;
-        let Some(Behind { visibility: behind, .. }) = self.behind else { return within };
+    fn fresh<S: Simd>(&self, simd: S, Part { at, ray, .. }: Part, wanted: u64, seen: &Seen<'_>) -> u64 {
+        let Some(Behind { visibility: behind, .. }) = self.behind else { return wanted };
         let now = u32x8::from_slice(simd, &seen.triangle[at..at + LANES]);
         let before = u32x8::from_slice(simd, &behind.triangle[ray..ray + LANES]);
-        !now.simd_eq(before).to_bitmask() & within
+        !now.simd_eq(before).to_bitmask() & wanted
     }
 
     /// Shades the pixels `fresh` of a part.

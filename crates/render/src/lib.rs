@@ -35,6 +35,7 @@
 //! # Ok::<(), trocar_render::Error>(())
 //! ```
 
+mod antialias;
 mod background;
 mod bvh;
 mod deferred;

@@ -6,7 +6,8 @@ use crate::rays::RayGenerator;
 use rayon::prelude::*;
 use trocar_camera::{ColorImage, DepthImage};
 
-/// A rendered picture, rows from the top. Depth, labels and normals are taken at pixel centres.
+/// A rendered picture, rows from the top. Depth, labels and normals are taken at pixel centres; so
+/// is light, but of paths.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Colour after exposure and tone mapping by the film.
@@ -63,6 +64,18 @@ impl Default for Picture {
 }
 
 impl Picture {
+    /// The first `count` rows.
+    pub(crate) fn first_rows(&mut self, count: usize) -> Rows<'_> {
+        let pixels = count * self.color.width;
+        Rows {
+            color: &mut self.color.pixels[..pixels],
+            depth: &mut self.depth.depth[..pixels],
+            labels: &mut self.labels[..pixels],
+            normals: &mut self.normals[..pixels],
+            light: &mut self.light[..pixels],
+        }
+    }
+
     /// Parts of `pixels` pixels, numbered.
     pub(crate) fn bands(&mut self, pixels: usize) -> impl IndexedParallelIterator<Item = (usize, Rows<'_>)> {
         let pixels = pixels.max(1);

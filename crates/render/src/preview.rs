@@ -1,5 +1,6 @@
 //! Previews: rasterised, with direct light.
 
+use crate::antialias::antialias;
 use crate::background::{Background, Behind};
 use crate::deferred::{Buffers, Shading, may_cast};
 use crate::film::Film;
@@ -11,10 +12,17 @@ use rayon::prelude::*;
 
 /// Rows that are drawn and shaded together, a multiple of a tile's. Fewer give more clusters that
 /// are in two bands, more give less to do in parallel.
-const ROWS: usize = 56;
+pub(crate) const ROWS: usize = 56;
 
-/// Makes a preview. It starts with the bodies at rest, if these are kept for the camera.
-pub(crate) fn preview(picture: &mut Picture, stage: &mut Stage, view: &View<'_>, shadows: bool, film: &Film) {
+/// Makes a preview, with smooth edges if `smooth`. It starts with the bodies at rest, if these are
+/// kept for the camera.
+pub(crate) fn preview(
+    picture: &mut Picture,
+    stage: &mut Stage,
+    view: &View<'_>,
+    (shadows, smooth): (bool, bool),
+    film: &Film,
+) {
     let mut memory = std::mem::take(&mut stage.memory);
     let mut visibility = std::mem::take(&mut memory.visibility);
     let background = memory.background(view, stage.changes());
@@ -39,6 +47,9 @@ pub(crate) fn preview(picture: &mut Picture, stage: &mut Stage, view: &View<'_>,
             }
             shade(&shading, k, rows, &seen, film, buffers);
         });
+    }
+    if smooth {
+        antialias(picture, stage, view, casts, film, &mut memory.points);
     }
     memory.visibility = visibility;
     stage.memory = memory;

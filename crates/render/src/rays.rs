@@ -4,6 +4,7 @@ mod projection;
 
 pub(crate) use projection::Projection;
 
+use crate::antialias::FINER;
 use crate::lanes::LANES;
 use glam::Vec3A;
 use rayon::prelude::*;
@@ -32,6 +33,8 @@ pub struct RayGenerator {
     circle: Option<f32>,
     projection: Projection,
     tiles: TileBounds,
+    /// Of the points of the pixels, see [`Self::finer`].
+    finer: OnceLock<Box<RayGenerator>>,
 }
 
 /// Least and greatest components of the rays of each tile.
@@ -70,6 +73,7 @@ impl RayGenerator {
             circle: None,
             projection: Projection::default(),
             tiles: TileBounds::default(),
+            finer: OnceLock::new(),
         };
         rays.projection = Projection::new(&rays.model, &rays);
         rays.finish();
@@ -80,6 +84,7 @@ impl RayGenerator {
     /// `diameter` is relative to the image height.
     #[must_use]
     pub fn with_circular_image(mut self, diameter: f32) -> Self {
+        self.finer = OnceLock::new();
         let radius = 0.5 * diameter * self.height as f32;
         self.circle = Some(radius);
         for pixel in 0..self.width * self.height {
@@ -107,6 +112,15 @@ impl RayGenerator {
     /// Height (px).
     pub fn height(&self) -> usize {
         self.height
+    }
+
+    /// The rays of the points of all pixels, [`FINER`] along each side.
+    pub(crate) fn finer(&self) -> &Self {
+        self.finer.get_or_init(|| {
+            let fine = Self::new(self.model.finer(FINER));
+            let diameter = self.circle.map(|radius| 2.0 * radius / self.height as f32);
+            Box::new(diameter.map_or(fine.clone(), |diameter| fine.with_circular_image(diameter)))
+        })
     }
 
     /// The lens that determines the rays: the camera model, and the radius of the circular image

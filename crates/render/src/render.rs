@@ -28,6 +28,10 @@ pub enum RenderSettings {
         /// Casts hard shadows with a ray per light.
         shadows: bool,
     },
+    /// [`Preview`](Self::Preview) with shadows and smooth edges: for films and reports. A pixel
+    /// that differs from a neighbour has the mean colour of four points. Noise of the film would
+    /// hide that; a picture with noise is a preview.
+    Smooth,
     /// The same light on what a ray per pixel hits: the reference for `Preview`.
     Traced {
         /// Casts hard shadows with a ray per light.
@@ -88,8 +92,13 @@ pub fn render_into(
     picture.resize(rays.width(), rays.height());
     stage.update_lamps();
     let view = View { rays, rotation: rotation_of(pose), origin: pose.translation.as_vec3a() };
-    if let RenderSettings::Preview { shadows } = *settings {
-        preview(picture, stage, &view, shadows, film);
+    let rasterised = match *settings {
+        RenderSettings::Preview { shadows } => Some((shadows, false)),
+        RenderSettings::Smooth => Some((true, film.noise.is_none())),
+        RenderSettings::Traced { .. } | RenderSettings::Path { .. } => None,
+    };
+    if let Some(kind) = rasterised {
+        preview(picture, stage, &view, kind, film);
         return;
     }
     stage.update_acceleration();
@@ -184,23 +193,21 @@ impl Shot<'_> {
                 visible.push(VisiblePoint::new(stage, hit, surface, *direction));
             }
         }
-        match **settings {
-            RenderSettings::Preview { shadows } | RenderSettings::Traced { shadows } => {
-                direct::light(stage, view.origin, visible, shadows, shadow_buffers, stacks);
-                for (i, visible) in pixel_indices.iter().zip(visible.iter()) {
-                    rows.light[*i] = visible.light.to_array();
+        if let RenderSettings::Path { samples, bounces, seed, .. } = **settings {
+            for (i, _) in rays.iter() {
+                let pixel = PixelSamples::new((first * width + i) as u32, seed);
+                let (light, guide) = self.pixel(first * width + i, pixel, (samples.max(1), bounces), stacks);
+                rows.light[*i] = light.to_array();
+                if let Some(to) = guides.get_mut(*i) {
+                    *to = guide;
                 }
             }
-            RenderSettings::Path { samples, bounces, seed, .. } => {
-                for (i, _) in rays.iter() {
-                    let pixel = PixelSamples::new((first * width + i) as u32, seed);
-                    let (light, guide) = self.pixel(first * width + i, pixel, (samples.max(1), bounces), stacks);
-                    rows.light[*i] = light.to_array();
-                    if let Some(to) = guides.get_mut(*i) {
-                        *to = guide;
-                    }
-                }
-            }
+            return;
+        }
+        let shadows = matches!(settings, RenderSettings::Traced { shadows: true });
+        direct::light(stage, view.origin, visible, shadows, shadow_buffers, stacks);
+        for (i, visible) in pixel_indices.iter().zip(visible.iter()) {
+            rows.light[*i] = visible.light.to_array();
         }
     }
 

@@ -1,23 +1,7 @@
-//! Conversions of pictures: averages, and colours of labels and depth.
+//! Colours of labels and of depth.
 
 use crate::colors::{self, SEQUENTIAL};
 use trocar_camera::ColorImage;
-
-/// The picture reduced by the factor `finer`, by averaging.
-pub fn averaged(image: &ColorImage, finer: usize) -> ColorImage {
-    if finer <= 1 {
-        return image.clone();
-    }
-    let (width, height) = (image.width / finer, image.height / finer);
-    let count = (finer * finer) as u32;
-    let pixel = |i: usize| {
-        let (x, y) = (i % width * finer, i / width * finer);
-        let block = (0..finer * finer).map(|k| image.pixels[(y + k / finer) * image.width + x + k % finer]);
-        let sum = block.fold([0_u32; 3], |s, p| [0, 1, 2].map(|c| s[c] + u32::from(p[c])));
-        sum.map(|s| ((s + count / 2) / count) as u8)
-    };
-    ColorImage { width, height, pixels: (0..width * height).map(pixel).collect() }
-}
 
 /// A colour per label. Hues are steps of the golden angle, which makes neighbours differ most.
 pub fn label_color(label: u16) -> [u8; 3] {

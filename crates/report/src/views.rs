@@ -1,12 +1,14 @@
 //! Rendered views: poses of cameras, and sections of bodies.
 
-use crate::colors::VIEW_GROUND;
 use glam::DVec3;
 use std::collections::BTreeMap;
 use trocar_camera::{Camera, ColorImage};
 use trocar_core::Pose;
 use trocar_geometry::{TetMesh, TriMesh};
-use trocar_render::phong::{Instance, PhongScene};
+use trocar_render::phong::PhongScene;
+
+/// Rays per side of a pixel.
+const SAMPLES: usize = 2;
 
 /// A camera and its pose.
 #[derive(Clone, Copy, Debug)]
@@ -41,14 +43,10 @@ impl View {
         Self { camera, pose: Pose { translation: turned.transform(eye), ..turned } }
     }
 
-    /// Renders `instances` with anti-aliasing and ambient occlusion, lit from above the viewer's
-    /// left shoulder.
-    pub fn picture(&self, instances: Vec<Instance>, samples: usize) -> ColorImage {
+    /// Renders `scene` with anti-aliasing, lit from above the viewer's left shoulder.
+    pub fn picture(&self, scene: &PhongScene) -> ColorImage {
         let light = self.pose.rotation * DVec3::new(-0.45, -0.8, -0.9);
-        let wires = instances.iter().any(|i| i.shading.wireframe);
-        let scene = PhongScene::new(instances, Some(light), VIEW_GROUND);
-        let scene = if wires { scene } else { scene.with_ambient_occlusion(24, 0.012) };
-        scene.render(&self.camera, &self.pose, samples).color
+        scene.render_lit(&self.camera, &self.pose, SAMPLES, Some(light)).color
     }
 }
 

@@ -30,6 +30,6 @@ pub use cell_stage::is_tool;
 pub use drawn::{DrawnBody, DrawnCell, DrawnMesh, DrawnPart};
 pub use error::{Error, Result};
 pub use organ::BoundSurface;
-pub use rig::{CameraNoise, CameraRig, PICTURE_SIDES};
+pub use rig::{CameraNoise, CameraRig};
 pub use skins::{ArmPosture, SkinnedOrgan, Skins};
 pub use trocar_camera::DepthNoise;

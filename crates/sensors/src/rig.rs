@@ -19,7 +19,7 @@ use trocar_specimen::Specimen;
 const NATIVE_DEPTH_WIDTH: f64 = 848.0;
 
 /// Range of the width and the height of a picture (px).
-pub const PICTURE_SIDES: std::ops::RangeInclusive<usize> = 8..=8192;
+const PICTURE_SIDES: std::ops::RangeInclusive<usize> = 8..=8192;
 
 /// Noise of the sensors; none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -3,11 +3,11 @@
 //! While it runs, `index.html` in its folder shows what the camera saw. It leads to the report when
 //! that is written.
 
+use crate::Result;
 use crate::lift::Lift;
 use crate::lift_result::LiftResult;
 use crate::reconstruct::{REPORT, Reconstructed, reconstruct_recording};
 use crate::video::write_whole;
-use crate::{Result, pages};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
@@ -87,11 +87,11 @@ impl Demo {
         let options = RecordOptions { frames: self.frames, seed: self.seed, ..RecordOptions::default() };
         trocar_phantom::record("phantom-a", &options, &recording, progress)?;
         index(page::refreshed(&under_way(&recording)?, REFRESH_S, None))?;
-        let (reconstructed, reconstruction) =
-            reconstruct_recording(&recording, &Settings::default(), &specimen, progress)?;
-        let before = pages::reconstruction_sections(&reconstruction)?;
+        let made = reconstruct_recording(&recording, &Settings::default(), &specimen, progress)?;
         let lift = Lift { threads: self.threads, ..Lift::default() };
-        let lifted = lift.write_specimen(&reconstruction.specimen, &specimen, Some(&before), &run, progress)?;
+        let organs = &made.reconstruction.specimen;
+        let lifted = lift.write_specimen(organs, &specimen, Some(&made.sections), &run, progress)?;
+        let reconstructed = made.figures;
         let report = format!("run/{REPORT}");
         let link = format!("<p><a href=\"{report}\">The report</a></p>");
         index(page::refreshed(&page::page(TITLE, "", &link), 0, Some(&report)))?;

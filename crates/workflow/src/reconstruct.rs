@@ -67,13 +67,10 @@ pub struct CompositeFigures {
 }
 
 impl CompositeFigures {
-    /// The figures of `r`, made from the recording in folder `recording`.
-    ///
-    /// # Errors
-    /// Names the file of the truth that is unreadable or of another size.
-    pub fn of(r: &Reconstruction, recording: &Path) -> Result<Self> {
-        let (truth, c) = (Truth::read(r, &recording.join("truth"))?, &r.composite);
-        Ok(Self {
+    /// The figures of `r`, with its errors against the `truth`.
+    pub fn of(r: &Reconstruction, truth: Option<&Truth>) -> Self {
+        let c = &r.composite;
+        Self {
             frames_used: c.frames_used,
             recovered_share: c.recovered_share,
             coverage: c.coverage,
@@ -81,9 +78,21 @@ impl CompositeFigures {
             frames_s: c.times.frames,
             decoding_cpu_s: c.times.decoding,
             medians_s: c.times.medians,
-            truth: truth.and_then(|truth| truth.figures(r)),
-        })
+            truth: truth.and_then(Truth::figures),
+        }
     }
+}
+
+/// What [`reconstruct_recording`] made.
+pub struct ReconstructedRecording {
+    /// The specimen in figures.
+    pub figures: Reconstructed,
+    /// The specimen and how it was found.
+    pub reconstruction: Reconstruction,
+    /// The truth of the recording, if it has one.
+    pub truth: Option<Truth>,
+    /// The sections of the report on the reconstruction, see [`pages::reconstruction_sections`].
+    pub sections: String,
 }
 
 /// Reconstructs the recording in folder `recording` into the specimen folder `output`, with its
@@ -96,22 +105,23 @@ pub fn reconstruct_recording(
     settings: &Settings,
     output: &Path,
     progress: &dyn Progress,
-) -> Result<(Reconstructed, Reconstruction)> {
+) -> Result<ReconstructedRecording> {
     let clock = Instant::now();
     refuse_overlap(recording, output)?;
     let staged = Specimen::stage(output)?;
     let reconstruction = trocar_reconstruct::reconstruct(&Recording::open(recording)?, settings, progress)?;
-    let truth = recording.join("truth");
-    let html = pages::reconstruction(&reconstruction, truth.is_dir().then_some(truth.as_path()))?;
-    finish(staged, &reconstruction.specimen, &html, progress)?;
-    let composite = CompositeFigures::of(&reconstruction, recording)?;
     let r = &reconstruction;
+    pages::check_sizes(r)?;
+    let truth = Truth::read(r, &recording.join("truth"))?;
+    let sections = pages::reconstruction_sections(r)?;
+    finish(staged, &r.specimen, &pages::reconstruction(r, &sections, truth.as_ref())?, progress)?;
+    let composite = CompositeFigures::of(r, truth.as_ref());
     let mut figures = figures(&r.specimen, Some(composite), r.notes.clone(), output, clock);
     figures.warnings.clone_from(&r.warnings);
     for (row, view) in figures.organs.iter_mut().zip(&r.organs) {
         row.moving_share = Some(view.moving_share);
     }
-    Ok((figures, reconstruction))
+    Ok(ReconstructedRecording { figures, reconstruction, truth, sections })
 }
 
 /// Makes the specimen folder `output` from a surface file, with its report.

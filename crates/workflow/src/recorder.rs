@@ -6,11 +6,11 @@ use std::time::{Duration, Instant};
 use trocar_camera::ColorImage;
 use trocar_cell::{Cell, CellEvent};
 use trocar_render::RenderSettings;
-use trocar_report::picture_colors::{averaged, shown};
+use trocar_report::picture_colors::shown;
 use trocar_sensors::{CameraNoise, CameraRig, DepthNoise};
 use trocar_task::{Episode, Step};
 
-/// Sizes of stills and video (px). Both are rendered at twice the size and averaged.
+/// Sizes of stills and video (px).
 const STILL_SIZE: [usize; 2] = [640, 360];
 const VIDEO_SIZE: [usize; 2] = [448, 252];
 
@@ -102,8 +102,8 @@ impl Recorder {
             && cell.time() >= FRAME_INTERVAL * self.frames.len() as f64 - 1e-9
             && self.frames.len() < MAX_FRAMES
         {
-            let picture = self.rig.render(cell, &self.camera, VIDEO_SIZE.map(|n| 2 * n), &RenderSettings::preview())?;
-            self.frames.push((averaged(&picture.color, 2), (1e3 * cell.time()).round() as i32));
+            let picture = self.rig.render(cell, &self.camera, VIDEO_SIZE, &RenderSettings::Smooth)?;
+            self.frames.push((picture.color.clone(), (1e3 * cell.time()).round() as i32));
         }
         Ok(())
     }
@@ -113,9 +113,9 @@ impl Recorder {
     }
 
     fn add_still(&mut self, cell: &Cell, what: &str) -> Result<()> {
-        let picture = self.rig.render(cell, &self.camera, STILL_SIZE.map(|n| 2 * n), &RenderSettings::preview())?;
+        let picture = self.rig.render(cell, &self.camera, STILL_SIZE, &RenderSettings::Smooth)?;
         let caption = format!("{what}, {:.2} s; {}", cell.time(), self.camera);
-        self.stills.push((caption, averaged(&picture.color, 2)));
+        self.stills.push((caption, picture.color.clone()));
         Ok(())
     }
 
@@ -126,8 +126,8 @@ impl Recorder {
         }
         self.add_still(cell, "At the end")?;
         if let Some(depth) = self.depth.clone() {
-            let picture = self.rig.render(cell, &depth, STILL_SIZE.map(|n| 2 * n), &RenderSettings::preview())?;
-            self.stills.push((format!("{depth} at the end"), averaged(&picture.color, 2)));
+            let picture = self.rig.render(cell, &depth, STILL_SIZE, &RenderSettings::Smooth)?;
+            self.stills.push((format!("{depth} at the end"), picture.color.clone()));
             self.rig.noise = CameraNoise { depth: Some(DepthNoise::default()), ..CameraNoise::default() };
             let picture = self.rig.render(cell, &depth, STILL_SIZE, &RenderSettings::Preview { shadows: false })?;
             self.stills.push((format!("Depth of {depth} with its noise, near is bright"), shown(&picture.depth)));

@@ -19,9 +19,9 @@ use std::path::{Path, PathBuf};
 use trocar_camera::ColorImage;
 use trocar_core::Progress;
 use trocar_render::{Picture, RenderSettings};
-use trocar_report::picture_colors::{averaged, label_color, shown};
+use trocar_report::picture_colors::{label_color, shown};
 use trocar_scene::Scene;
-use trocar_sensors::{CameraNoise, CameraRig, DepthNoise, OUTSIDE, PICTURE_SIDES};
+use trocar_sensors::{CameraNoise, CameraRig, DepthNoise, OUTSIDE};
 use trocar_specimen::Specimen;
 use trocar_task::{EPISODE_FILE, EpisodeFile};
 
@@ -198,14 +198,7 @@ impl Rendering {
 
     fn settings(&self) -> RenderSettings {
         let of = if self.denoise { RenderSettings::denoised } else { RenderSettings::path };
-        self.samples.map_or_else(RenderSettings::preview, of)
-    }
-
-    /// The factor of the rendered size. Direct light has one ray per pixel, so it is rendered at
-    /// twice the size and averaged, unless that exceeds the largest picture.
-    fn supersampling(&self, size: [usize; 2]) -> usize {
-        let fits = size.iter().all(|n| 2 * n <= *PICTURE_SIDES.end());
-        if self.samples.is_none() && !self.noise && fits { 2 } else { 1 }
+        self.samples.map_or(RenderSettings::Smooth, of)
     }
 
     fn specimen(&self, folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Rendered> {
@@ -218,13 +211,10 @@ impl Rendering {
         let size = self.size.map_or_else(|| rig.size(&camera), Ok)?;
         self.cut(&mut rig, &camera, size, &specimen_points(&specimen))?;
         let clock = std::time::Instant::now();
-        let finer = self.supersampling(size);
-        let fine = rig.render_still(&camera, size.map(|n| n * finer), &self.settings())?;
-        let color = averaged(&fine.color, finer);
-        let picture = rig.render_still(&camera, size, &RenderSettings::Preview { shadows: false })?.clone();
+        let picture = rig.render_still(&camera, size, &self.settings())?.clone();
         let render_s = clock.elapsed().as_secs_f64();
         check_interrupted(progress)?;
-        self.write(&rig, &camera, &color, &picture, output, (0.0, render_s))
+        self.write(&rig, &camera, &picture, output, (0.0, render_s))
     }
 
     fn cut(&self, rig: &mut CameraRig, camera: &str, size: [usize; 2], points: &[DVec3]) -> Result<()> {
@@ -253,15 +243,12 @@ impl Rendering {
             (0..world.model.bodies().len()).flat_map(|b| world.state.positions(&world.model, b)).collect();
         self.cut(&mut rig, camera, size, &points)?;
         let clock = std::time::Instant::now();
-        let finer = self.supersampling(size);
-        let (color, picture) = playback::stage(progress, "picture", 1, || {
-            let fine = rig.render(play.cell(), camera, size.map(|n| n * finer), &self.settings())?;
-            let color = averaged(&fine.color, finer);
-            Ok((color, rig.render(play.cell(), camera, size, &RenderSettings::Preview { shadows: false })?.clone()))
+        let picture = playback::stage(progress, "picture", 1, || {
+            Ok(rig.render(play.cell(), camera, size, &self.settings())?.clone())
         })?;
         check_interrupted(progress)?;
         let render_s = clock.elapsed().as_secs_f64();
-        let made = self.write(&rig, camera, &color, &picture, output, (play.cell().time(), render_s))?;
+        let made = self.write(&rig, camera, &picture, output, (play.cell().time(), render_s))?;
         Ok(Rendered { differs: play.difference(), ..made })
     }
 
@@ -280,16 +267,15 @@ impl Rendering {
         let size = self.size.unwrap_or([even(small(width)), even(small(height))]);
         let hz = frame_rate(play.cell().period(), max_hz);
         let (mut frames, mut render_s) = (0_u32, 0.0);
-        let mut picture = Picture::new(size[0], size[1]);
+        let mut labels = vec![0; size[0] * size[1]];
         playback::stage(progress, "video", play.periods().unwrap_or(1) as u64, || {
             loop {
                 check_interrupted(progress)?;
                 if play.cell().time() >= f64::from(frames) / f64::from(hz) - 1e-9 {
                     let clock = std::time::Instant::now();
-                    let finer = self.supersampling(size);
-                    let fine = rig.render(play.cell(), camera, size.map(|n| n * finer), &self.settings())?;
-                    video.add(averaged(&fine.color, finer), 1000.0 * f64::from(frames) / f64::from(hz), hz)?;
-                    picture.labels.clone_from(&fine.labels);
+                    let picture = rig.render(play.cell(), camera, size, &self.settings())?;
+                    video.add(picture.color.clone(), 1000.0 * f64::from(frames) / f64::from(hz), hz)?;
+                    labels.clone_from(&picture.labels);
                     render_s += clock.elapsed().as_secs_f64();
                     frames += 1;
                 }
@@ -301,7 +287,7 @@ impl Rendering {
         })?;
         video.finish(output)?;
         let files = vec![output.display().to_string()];
-        let made = self.rendered(&rig, (camera, size), &picture.labels, files, (play.cell().time(), render_s));
+        let made = self.rendered(&rig, (camera, size), &labels, files, (play.cell().time(), render_s));
         Ok(Rendered { frames: frames as usize, differs: play.difference(), ..made })
     }
 
@@ -309,7 +295,6 @@ impl Rendering {
         &self,
         rig: &CameraRig,
         camera: &str,
-        color: &ColorImage,
         picture: &Picture,
         output: &Path,
         times: (f64, f64),
@@ -317,7 +302,7 @@ impl Rendering {
         let stem = output.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let beside = |what: &str| output.with_file_name(format!("{stem}-{what}.png"));
         let mut files = vec![output.to_owned()];
-        color.write_png(output)?;
+        picture.color.write_png(output)?;
         if self.depth {
             files.extend([beside("depth"), beside("depth-shown")]);
             picture.depth.write_png(&files[files.len() - 2], DEPTH_STEP)?;
@@ -330,7 +315,7 @@ impl Rendering {
             image.write_png(&files[files.len() - 1])?;
         }
         let files = files.iter().map(|f| f.display().to_string()).collect();
-        Ok(self.rendered(rig, (camera, [color.width, color.height]), &picture.labels, files, times))
+        Ok(self.rendered(rig, (camera, [picture.color.width, picture.color.height]), &picture.labels, files, times))
     }
 
     /// The figures of one picture.

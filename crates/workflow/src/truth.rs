@@ -9,12 +9,14 @@ use trocar_reconstruct::Reconstruction;
 /// Unit of a phantom's truth depth (m).
 pub const DEPTH_UNIT: f64 = 1e-4;
 
-/// The camera's view without instruments and noise.
+/// The camera's view without instruments and noise, and how a composite differs from it.
 pub struct Truth {
     /// Its colours.
     pub color: Option<ColorImage>,
     /// Its depth.
     pub depth: Option<DepthImage>,
+    /// The errors in the whole image, in the part under the instruments, and in the rest.
+    pub parts: [Part; 3],
 }
 
 /// Errors of the pixels of one part of the image.
@@ -60,33 +62,33 @@ impl Truth {
             let reason = format!("it has {width} x {height} pixels; the composite has {} x {}", size.0, size.1);
             Err(Error::Truth { path: path.to_owned(), reason })
         };
-        let mut truth = Self { color: None, depth: None };
+        let (mut true_color, mut true_depth) = (None, None);
         if let Some(path) = find("color.png") {
             let image = ColorImage::read(&path)?;
             fits(&path, image.width, image.height)?;
-            truth.color = Some(image);
+            true_color = Some(image);
         }
         if let Some(path) = find("depth.png") {
             let image = DepthImage::read(&path, DEPTH_UNIT)?;
             fits(&path, image.width, image.height)?;
-            truth.depth = Some(image);
+            true_depth = Some(image);
         }
-        Ok((truth.color.is_some() || truth.depth.is_some()).then_some(truth))
-    }
-
-    /// The whole image, the part under the instruments, and the rest.
-    pub fn parts(&self, r: &Reconstruction) -> [Part; 3] {
+        if true_color.is_none() && true_depth.is_none() {
+            return Ok(None);
+        }
+        let (color, depth) = (true_color.as_ref(), true_depth.as_ref());
         let under = |i: usize| r.composite.instruments.set[i];
-        [
-            self.part("whole image", r, &|_| true),
-            self.part("under the instruments", r, &under),
-            self.part("elsewhere", r, &|i| !under(i)),
-        ]
+        let parts = [
+            Part::of("whole image", r, (color, depth), &|_| true),
+            Part::of("under the instruments", r, (color, depth), &under),
+            Part::of("elsewhere", r, (color, depth), &|i| !under(i)),
+        ];
+        Ok(Some(Self { color: true_color, depth: true_depth, parts }))
     }
 
     /// The figures; `None` without true depth.
-    pub fn figures(&self, r: &Reconstruction) -> Option<TruthFigures> {
-        let [whole, under, _] = self.parts(r);
+    pub fn figures(&self) -> Option<TruthFigures> {
+        let [whole, under, _] = &self.parts;
         let (_, depth_error_median_mm, depth_error_p95_mm, depth_error_signed_mm) = whole.depth?;
         Some(TruthFigures {
             depth_error_median_mm,
@@ -96,11 +98,19 @@ impl Truth {
             color_error_mean: whole.color.map(|c| c.0),
         })
     }
+}
 
-    fn part(&self, name: &'static str, r: &Reconstruction, inside: &dyn Fn(usize) -> bool) -> Part {
+impl Part {
+    /// Of the pixels `inside`, against the true colours and the true depth.
+    fn of(
+        name: &'static str,
+        r: &Reconstruction,
+        (color, depth): (Option<&ColorImage>, Option<&DepthImage>),
+        inside: &dyn Fn(usize) -> bool,
+    ) -> Self {
         let filled: Vec<usize> =
             (0..r.composite.depth.depth.len()).filter(|&i| r.composite.depth.depth[i] > 0.0 && inside(i)).collect();
-        let depth = self.depth.as_ref().and_then(|truth| {
+        let depth = depth.and_then(|truth| {
             let signed: Vec<f64> = filled
                 .iter()
                 .filter(|&&i| truth.depth[i] > 0.0)
@@ -109,7 +119,7 @@ impl Truth {
             let size: Vec<f64> = signed.iter().map(|e| e.abs()).collect();
             Some((size.len(), quantile(&size, 0.5)?, quantile(&size, 0.95)?, quantile(&signed, 0.5)?))
         });
-        let color = self.color.as_ref().and_then(|truth| {
+        let color = color.and_then(|truth| {
             let difference = |&i: &usize| {
                 let (a, b) = (r.composite.color.pixels[i], truth.pixels[i]);
                 (0..3).map(|c| f64::from(a[c].abs_diff(b[c]))).sum::<f64>() / 3.0
@@ -117,16 +127,15 @@ impl Truth {
             let all: Vec<f64> = filled.iter().map(difference).collect();
             Some((all.iter().sum::<f64>() / all.len().max(1) as f64, quantile(&all, 0.95)?))
         });
-        Part { name, depth, color }
+        Self { name, depth, color }
     }
 }
 
 /// Value below which the share `q` of the finite values is (nearest rank); `None` without any.
 pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let rank = (q * (sorted.len().saturating_sub(1)) as f64).round() as usize;
-    sorted.get(rank).copied()
+    let mut finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let rank = (q * finite.len().saturating_sub(1) as f64).round() as usize;
+    (rank < finite.len()).then(|| *finite.select_nth_unstable_by(rank, f64::total_cmp).1)
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use trocar_reconstruct::{Composite, CompositeTimes, OrganView, Reconstruction};
 use trocar_render::phong::{Instance, PhongScene, Shading};
 use trocar_specimen::{Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 use trocar_workflow::pages as report;
+use trocar_workflow::truth::Truth;
 
 /// A name that would break a page that does not escape it.
 const HOSTILE: &str = "<script>alert('x')</script>&\"";
@@ -224,6 +225,12 @@ fn check(html: &str) -> usize {
     pictures
 }
 
+/// The page of `r`, compared with the truth in a folder.
+fn page(r: &Reconstruction, truth: Option<&Path>) -> trocar_workflow::Result<String> {
+    let truth = truth.map_or(Ok(None), |dir| Truth::read(r, dir))?;
+    report::reconstruction(r, &report::reconstruction_sections(r)?, truth.as_ref())
+}
+
 #[test]
 fn a_reconstruction_is_shown_whole() {
     let r = reconstruction();
@@ -233,7 +240,7 @@ fn a_reconstruction_is_shown_whole() {
     r.composite.color.write_png(&truth.join("color.png")).unwrap();
     r.composite.depth.write_png(&truth.join("depth.png"), 1e-4).unwrap();
 
-    let html = report::reconstruction(&r, Some(dir.path())).unwrap();
+    let html = page(&r, Some(dir.path())).unwrap();
     keep("reconstruction.html", &html);
     // 4 of the camera, 2 side by side, 2 of the truth, 4 of the bodies, 1 + 4 of the depth error.
     assert_eq!(check(&html), 17);
@@ -242,12 +249,12 @@ fn a_reconstruction_is_shown_whole() {
     }
     let mut named = r.clone();
     named.specimen.name = "phantom-a".into();
-    let beside_paper = report::reconstruction(&named, None).unwrap();
+    let beside_paper = page(&named, None).unwrap();
     assert!(
         beside_paper.contains("8\u{202f}072") && !html.contains("8\u{202f}072"),
         "Table I stands beside its phantom"
     );
-    let without = report::reconstruction(&r, None).unwrap();
+    let without = page(&r, None).unwrap();
     assert!(!without.contains("Composite against the truth"));
 }
 
@@ -256,7 +263,7 @@ fn a_truth_of_another_size_is_named() {
     let r = reconstruction();
     let dir = tempfile::tempdir().unwrap();
     DepthImage::new(20, 10).write_png(&dir.path().join("depth.png"), 1e-4).unwrap();
-    let message = report::reconstruction(&r, Some(dir.path())).unwrap_err().to_string();
+    let message = page(&r, Some(dir.path())).unwrap_err().to_string();
     assert!(message.contains("depth.png") && message.contains("20 x 10"), "{message}");
 }
 
@@ -264,7 +271,7 @@ fn a_truth_of_another_size_is_named() {
 fn images_that_do_not_fit_are_an_error() {
     let mut r = reconstruction();
     r.organs[1].depth_error.pop();
-    assert!(report::reconstruction(&r, None).unwrap_err().to_string().contains("stomach"));
+    assert!(page(&r, None).unwrap_err().to_string().contains("stomach"));
     r.composite.color = ColorImage::new(3, 3, [0; 3]);
     assert!(report::reconstruction_sections(&r).is_err());
 }
@@ -291,9 +298,9 @@ fn a_warning_stands_above_the_figures_and_nothing_is_green_beside_it() {
         html[html.find("From the recording").unwrap()..html.find("What the camera saw").unwrap()].to_owned()
     };
     let mut r = reconstruction();
-    assert!(section(&report::reconstruction(&r, None).unwrap()).contains(good));
+    assert!(section(&page(&r, None).unwrap()).contains(good));
     r.warnings = vec!["Tissue moves during the window: appendix <1>.".to_owned()];
-    let doubtful = section(&report::reconstruction(&r, None).unwrap());
+    let doubtful = section(&page(&r, None).unwrap());
     let warning =
         doubtful.find("<p class=\"warning\"><b>Warning.</b> Tissue moves during the window: appendix &lt;1&gt;.</p>");
     assert!(warning.unwrap() < doubtful.find("Watertight").unwrap());

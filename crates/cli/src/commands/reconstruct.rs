@@ -22,7 +22,7 @@ pub fn run(arguments: &Reconstruct, json: bool, progress: &dyn Progress) -> Resu
         ..Settings::default()
     };
     let reconstructed = match (&arguments.recording, &arguments.surface) {
-        (Some(recording), _) => reconstruct_recording(recording, &settings, &arguments.output, progress)?.0,
+        (Some(recording), _) => reconstruct_recording(recording, &settings, &arguments.output, progress)?.figures,
         (None, Some(surface)) => {
             // clap requires the unit with a surface.
             let unit = arguments.units.map_or(Unit::Millimetre, Unit::from);

@@ -133,7 +133,7 @@ impl Drawing {
                 let Some((t, u, v)) = intersect(corners, origin, out.directions[column]) else { continue };
                 let nearest = out.hits[column].map_or(f64::INFINITY, |hit| hit.t);
                 if t > 0.0 && t < nearest {
-                    out.hits[column] = Some(Hit { triangle: tracer.given(*triangle), t, u, v });
+                    out.hits[column] = Some(Hit { triangle: *triangle, t, u, v });
                     out.ties[column] = false;
                 } else if t == nearest {
                     out.ties[column] = true;

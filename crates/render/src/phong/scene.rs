@@ -87,10 +87,12 @@ pub fn label_mask(frame: &PhongImage, label: u16) -> Mask {
     Mask { width: frame.color.width, height: frame.color.height, set }
 }
 
-/// A camera at its pose.
+/// A camera at its pose, and the light.
 pub(super) struct View<'a> {
     pub camera: &'a Camera,
     pub pose: &'a Pose,
+    /// Direction to the light, of unit length; `None` for a light at the camera.
+    pub light: Option<DVec3>,
 }
 
 impl View<'_> {
@@ -113,7 +115,7 @@ impl PhongScene {
             normals: Vec::new(),
             albedo: Vec::new(),
             open: Vec::new(),
-            light: light.and_then(DVec3::try_normalize),
+            light,
             background,
         };
         for (index, Instance { mesh, label, shading }) in instances.into_iter().enumerate() {
@@ -171,9 +173,14 @@ impl PhongScene {
     /// Renders through `camera` at `pose` (camera to world). Colour averages `samples` x `samples`
     /// rays per pixel; depth, labels and facing use the pixel centre.
     pub fn render(&self, camera: &Camera, pose: &Pose, samples: usize) -> PhongImage {
+        self.render_lit(camera, pose, samples, self.light)
+    }
+
+    /// [`render`](Self::render) with another direction towards the light.
+    pub fn render_lit(&self, camera: &Camera, pose: &Pose, samples: usize, light: Option<DVec3>) -> PhongImage {
         let (width, height) = (camera.width, camera.height);
         let samples = samples.max(1);
-        let view = View { camera, pose };
+        let view = View { camera, pose, light: light.and_then(DVec3::try_normalize) };
         let mut frame = PhongImage {
             color: ColorImage::new(width, height, self.background),
             depth: DepthImage::new(width, height),
@@ -238,8 +245,8 @@ impl PhongScene {
         let smooth = weights[0] * self.normals[a] + weights[1] * self.normals[b] + weights[2] * self.normals[c];
         let normal = side * smooth.try_normalize().unwrap_or(flat);
         let point = view.pose.translation + direction * hit.t;
-        let to_light = self.light.unwrap_or(to_eye);
-        let shadowed = self.light.is_some_and(|light| {
+        let to_light = view.light.unwrap_or(to_eye);
+        let shadowed = view.light.is_some_and(|light| {
             // Offset from the surface by a fraction of the viewing distance, larger than the
             // rounding error of the hit.
             let origin = point + side * flat * (1e-4 * (point - view.pose.translation).length());

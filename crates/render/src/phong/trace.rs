@@ -5,6 +5,7 @@ use obvhs::aabb::Aabb;
 use obvhs::cwbvh::{CwBvh, builder::build_cwbvh};
 use obvhs::ray::{Ray, RayHit};
 use obvhs::{Boundable, BvhBuildParams};
+use std::sync::OnceLock;
 
 /// Margin of the triangles' boxes in units of half the scene's extent. It covers single-precision
 /// rounding.
@@ -16,12 +17,19 @@ const EDGE_TOLERANCE: f64 = 1e-9;
 /// The tree's builder has absolute tolerances, so the scene is shifted and scaled into the unit
 /// cube for it.
 pub(crate) struct Tracer {
-    bvh: CwBvh,
-    /// Triangles in the order of the tree: first corner and the two edges from it (m).
+    /// Triangles as they were given: first corner and the two edges from it (m).
     corners: Vec<[DVec3; 3]>,
+    /// Built for the first ray: what is drawn needs none.
+    tree: OnceLock<Tree>,
     centre: DVec3,
     /// Half the largest extent (m).
     radius: f64,
+}
+
+struct Tree {
+    bvh: CwBvh,
+    /// Triangles in the order of the tree, as in [`Tracer::corners`].
+    corners: Vec<[DVec3; 3]>,
 }
 
 /// First intersection of a ray with the scene.
@@ -45,7 +53,7 @@ impl Boundable for Bounds {
 }
 
 impl Tracer {
-    /// Builds the tree. `triangles` are three finite corners each.
+    /// `triangles` are three finite corners each.
     pub fn new(triangles: &[[DVec3; 3]]) -> Self {
         let (mut low, mut high) = (DVec3::MAX, DVec3::MIN);
         for p in triangles.as_flattened() {
@@ -56,38 +64,27 @@ impl Tracer {
         }
         let centre = (low + high) / 2.0;
         let radius = ((high - low).max_element() / 2.0).max(1e-9);
-        let scaled = |p: DVec3| ((p - centre) / radius).as_vec3a();
-        let bounds: Vec<Bounds> = triangles
-            .iter()
-            .map(|t| {
-                let [a, b, c] = t.map(scaled);
-                Bounds(Aabb { min: a.min(b).min(c) - BOX_MARGIN, max: a.max(b).max(c) + BOX_MARGIN })
-            })
-            .collect();
-        let bvh = if bounds.is_empty() {
-            CwBvh::default()
-        } else {
-            build_cwbvh(&bounds, BvhBuildParams::fast_build(), &mut std::time::Duration::default())
-        };
-        let corners = bvh
-            .primitive_indices
-            .iter()
-            .map(|&i| {
-                let [a, b, c] = triangles[i as usize];
-                [a, b - a, c - a]
-            })
-            .collect();
-        Self { bvh, corners, centre, radius }
+        let corners = triangles.iter().map(|[a, b, c]| [*a, *b - *a, *c - *a]).collect();
+        Self { corners, tree: OnceLock::new(), centre, radius }
     }
 
-    /// The triangles, in an order of its own: first corner and the two edges from it (m).
+    /// The triangles: first corner and the two edges from it (m).
     pub fn corners(&self) -> &[[DVec3; 3]] {
         &self.corners
     }
 
-    /// The number that triangle `own` of [`Self::corners`] had in [`Self::new`].
-    pub fn given(&self, own: u32) -> u32 {
-        self.bvh.primitive_indices[own as usize]
+    fn tree(&self) -> &Tree {
+        self.tree.get_or_init(|| {
+            let scaled = |p: DVec3| ((p - self.centre) / self.radius).as_vec3a();
+            let bounds = self.corners.iter().map(|[a, ab, ac]| {
+                let [a, b, c] = [*a, *a + *ab, *a + *ac].map(scaled);
+                Bounds(Aabb { min: a.min(b).min(c) - BOX_MARGIN, max: a.max(b).max(c) + BOX_MARGIN })
+            });
+            let bounds: Vec<Bounds> = bounds.collect();
+            let bvh = build_cwbvh(&bounds, BvhBuildParams::fast_build(), &mut std::time::Duration::default());
+            let corners = bvh.primitive_indices.iter().map(|&i| self.corners[i as usize]).collect();
+            Tree { bvh, corners }
+        })
     }
 
     /// First hit with `t` in (0, `reach`]. `direction` need not be of unit length.
@@ -95,11 +92,11 @@ impl Tracer {
         let mut best: Option<Hit> = None;
         let mut nearest = reach;
         let (ray, entry, unit) = self.tree_ray(origin, direction, reach)?;
-        let mut ignored = RayHit::none();
-        self.bvh.ray_traverse(ray, &mut ignored, |_, id| match intersect(&self.corners[id], origin, direction) {
+        let (mut ignored, Tree { bvh, corners }) = (RayHit::none(), self.tree());
+        bvh.ray_traverse(ray, &mut ignored, |_, id| match intersect(&corners[id], origin, direction) {
             Some((t, u, v)) if t > 0.0 && t <= nearest => {
                 nearest = t;
-                best = Some(Hit { triangle: self.bvh.primitive_indices[id], t, u, v });
+                best = Some(Hit { triangle: bvh.primitive_indices[id], t, u, v });
                 ((t - entry) * unit).max(0.0) as f32
             }
             _ => f32::INFINITY,
@@ -110,7 +107,8 @@ impl Tracer {
     /// Whether a surface lies on the ray with `t` in (0, `reach`].
     pub fn blocked(&self, origin: DVec3, direction: DVec3, reach: f64) -> bool {
         let Some((ray, _, _)) = self.tree_ray(origin, direction, reach) else { return false };
-        !self.bvh.ray_traverse_miss(ray, |_, id| match intersect(&self.corners[id], origin, direction) {
+        let Tree { bvh, corners } = self.tree();
+        !bvh.ray_traverse_miss(ray, |_, id| match intersect(&corners[id], origin, direction) {
             Some((t, _, _)) if t > 0.0 && t <= reach => 0.0,
             _ => f32::INFINITY,
         })

@@ -13,12 +13,11 @@ use trocar_geometry::io::{Unit, read_surface};
 use trocar_phantom::RecordOptions;
 use trocar_reconstruct::{BackRule, Reconstruction, Settings, SurfaceRule, depth_error, modelled_volume};
 use trocar_recording::Recording;
-use trocar_render::phong::PhongScene;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card, Columns};
 use trocar_report::table::{count, fixed, percent, yes_or_no};
 use trocar_report::{colors, figures, overlays};
-use trocar_workflow::pages::check_sizes;
+use trocar_workflow::pages::{check_sizes, organ_views};
 use trocar_workflow::paper::table_i;
 use trocar_workflow::phantoms::recorded;
 use trocar_workflow::truth::DEPTH_UNIT;
@@ -129,19 +128,18 @@ impl Study for ReconstructionExperiment {
             let folder = job.output().join(phantom);
             let recording = folder.join("recording");
             recorded(phantom, &record, &recording, job.progress)?;
-            let (made, reconstruction) =
-                reconstruct_recording(&recording, &settings, &folder.join("specimen"), job.progress)?;
+            let made = reconstruct_recording(&recording, &settings, &folder.join("specimen"), job.progress)?;
             let binary_grid = Settings { surface: SurfaceRule::BinaryGrid, ..settings.clone() };
             let binary_grid =
                 trocar_reconstruct::reconstruct(&Recording::open(&recording)?, &binary_grid, job.progress)?;
-            result.organs.extend(rows(phantom, &recording, &reconstruction, &binary_grid, settings.back)?);
+            result.organs.extend(rows(phantom, &recording, &made.reconstruction, &binary_grid, settings.back)?);
             result.phantoms.push(PhantomFigures {
                 phantom: phantom.clone(),
-                composite: CompositeFigures::of(&reconstruction, &recording)?,
-                seconds: made.seconds,
-                report: made.report,
+                composite: CompositeFigures::of(&made.reconstruction, made.truth.as_ref()),
+                seconds: made.figures.seconds,
+                report: made.figures.report,
             });
-            reconstructions.push(reconstruction);
+            reconstructions.push(made.reconstruction);
         }
         let document = document(&result, &reconstructions)?;
         Ok((result, document))
@@ -321,10 +319,7 @@ fn pictures(made: &[Reconstruction]) -> Result<Section> {
         let name = page::escape(&r.specimen.name);
         let caption = format!("<b>{name}.</b> The centre frame of the window.");
         shown.push(figures::figure(&r.composite.input, "input frame", &caption)?);
-        let scene =
-            PhongScene::new(trocar_workflow::pages::organ_views::surfaces(&r.specimen), None, colors::VIEW_GROUND)
-                .with_ambient_occlusion(24, 0.012);
-        let rendered = scene.render(camera, &Pose::IDENTITY, 2).color;
+        let rendered = organ_views::surfaces(&r.specimen).render(camera, &Pose::IDENTITY, 2).color;
         let caption = "<b>Reconstructed.</b> The surfaces through the recording camera.";
         shown.push(figures::figure(&rendered, "reconstructed surfaces through the recording camera", caption)?);
     }

@@ -5,20 +5,16 @@ use super::panel::{Panel, Seen};
 use crate::{Error, Result};
 use glam::DVec3;
 use std::sync::Arc;
-use trocar_camera::{Camera, ColorImage, DepthImage};
+use trocar_camera::{Camera, ColorImage};
 use trocar_core::{Pose, Progress};
 use trocar_geometry::{Skin, TriMesh};
 use trocar_identify::{Grip, Lifted, LoneOrgan, Pace, SeenLift};
-use trocar_render::RenderSettings;
-use trocar_report::picture_colors::averaged;
+use trocar_render::{Picture, RenderSettings};
 use trocar_sensors::CameraRig;
 use trocar_specimen::Specimen;
 
 /// The rig's name of the recording's camera.
 const CAMERA: &str = "recording";
-
-/// Pictures are rendered at so many times the size and averaged.
-const FINER: usize = 2;
 
 /// What reproduces a lift.
 #[derive(Clone, Copy)]
@@ -99,21 +95,16 @@ impl SimulatedView {
 
     /// Its panel at moment `k`, beside the measured one.
     pub fn panel(&mut self, panel: &Panel, k: usize, measured: &Moment) -> Result<ColorImage> {
-        let (color, depth, _) = self.picture(k)?;
-        panel.simulated(Seen { color: &color, depth: &depth }, &self.moments[k], measured)
+        let seen = self.picture(k)?.clone();
+        panel.simulated(Seen { color: &seen.color, depth: &seen.depth }, &self.moments[k], measured)
     }
 
-    /// Colour, depth and labels at moment `k`, in the size of the camera.
-    pub fn picture(&mut self, k: usize) -> Result<(ColorImage, DepthImage, Vec<u16>)> {
+    /// The picture at moment `k`, in the size of the camera.
+    pub fn picture(&mut self, k: usize) -> Result<&Picture> {
         self.shown[self.lifted].1 = self.surfaces[k].iter().map(|p| self.pose.transform(*p)).collect();
         self.rig.show(&self.shown, !self.begun, &[])?;
         self.begun = true;
-        let [width, height] = self.size;
-        let fine = self.rig.render_still(CAMERA, self.size.map(|n| n * FINER), &RenderSettings::preview())?;
-        let at = |i: usize| (i / width * FINER) * width * FINER + i % width * FINER;
-        let depth = (0..width * height).map(|i| fine.depth.depth[at(i)]).collect();
-        let labels = (0..width * height).map(|i| fine.labels[at(i)]).collect();
-        Ok((averaged(&fine.color, FINER), DepthImage { width, height, depth }, labels))
+        Ok(self.rig.render_still(CAMERA, self.size, &RenderSettings::Smooth)?)
     }
 
     /// The label of the lifted organ.

@@ -95,9 +95,9 @@ fn landmarks_lie_on_the_tissue_of_both_panels() {
     let mut view = SimulatedView::new(&made, (&frames, &[0.0, 1.0]), &Silent).unwrap();
     let simulated = view.moments().to_vec();
     for k in 0..2 {
-        let (_, depth, labels) = view.picture(k).unwrap();
-        let set = labels.iter().map(|label| *label == view.label()).collect();
-        lie(&Mask { width: depth.width, height: depth.height, set }, &simulated[k].landmarks, 10);
+        let seen = view.picture(k).unwrap().clone();
+        let set = seen.labels.iter().map(|label| *label == view.label()).collect();
+        lie(&Mask { width: seen.depth.width, height: seen.depth.height, set }, &simulated[k].landmarks, 10);
     }
     let moved = |k: usize| simulated[k].landmarks[10].unwrap();
     assert!(moved(1).distance(moved(0)) > 3e-3, "{} m", moved(1).distance(moved(0)));

@@ -1,7 +1,6 @@
 //! Sections on the recorded images and the fit: input frame, composite, masks, and depth errors of
 //! the surfaces.
 
-use super::organ_views;
 use crate::truth::quantile;
 use crate::{Error, Result};
 use trocar_core::Pose;
@@ -79,8 +78,8 @@ fn judged(card: Card, met: bool, doubtful: bool) -> Card {
     if met && doubtful { card } else { card.met(met) }
 }
 
-/// Input, composite, masks, and the surfaces through the recording camera.
-pub(super) fn images(r: &Reconstruction) -> Result<String> {
+/// Input, composite, masks, and the `surfaces` through the recording camera.
+pub(super) fn images(r: &Reconstruction, surfaces: &PhongScene) -> Result<String> {
     let mut input = r.composite.input.clone();
     overlays::outline(&mut input, &r.composite.instruments, INSTRUMENT);
     let legend = page::legend([("instruments", INSTRUMENT)]);
@@ -110,9 +109,7 @@ pub(super) fn images(r: &Reconstruction) -> Result<String> {
     )?;
     let mut top = vec![input, composite, depth_figure(r)?, masked];
     if let Some(camera) = &r.specimen.camera {
-        let scene = PhongScene::new(organ_views::surfaces(&r.specimen), None, colors::VIEW_GROUND)
-            .with_ambient_occlusion(24, 0.012);
-        let rendered = scene.render(camera, &Pose::IDENTITY, 2).color;
+        let rendered = surfaces.render(camera, &Pose::IDENTITY, 2).color;
         let caption = "<b>Composite,</b> for comparison.";
         top.push(figures::figure(&r.composite.color, "composite, for comparison", caption)?);
         top.push(figures::figure(

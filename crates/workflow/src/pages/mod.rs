@@ -14,8 +14,8 @@ mod over_time;
 mod truth;
 
 use crate::lift_result::FinishedLift;
+use crate::truth::Truth;
 use crate::{Result, counted};
-use std::path::Path;
 use trocar_geometry::RepairReport;
 use trocar_reconstruct::Reconstruction;
 use trocar_report::{page, table};
@@ -24,21 +24,14 @@ use trocar_specimen::Specimen;
 pub(crate) use episode::episode;
 pub use images::check_sizes;
 
-/// The page of a specimen reconstructed from a recording. `truth_dir` is the phantom's folder
-/// `truth` or the recording that holds it. Its `color.png` and `depth.png` (unit 0.1 mm), if
-/// present, are compared with the composite.
+/// The page of a specimen reconstructed from a recording, with its [`reconstruction_sections`]. The
+/// composite is compared with the `truth` of a phantom.
 ///
 /// # Errors
-/// Images of different sizes, an unreadable truth file, a picture that cannot be encoded.
-pub fn reconstruction(r: &Reconstruction, truth_dir: Option<&Path>) -> Result<String> {
-    let truth = match truth_dir {
-        Some(dir) => {
-            images::check_sizes(r)?;
-            truth::section(r, dir)?
-        }
-        None => String::new(),
-    };
-    let body = reconstruction_sections(r)? + &truth + &provenance(&r.specimen);
+/// A picture that cannot be encoded.
+pub fn reconstruction(r: &Reconstruction, sections: &str, truth: Option<&Truth>) -> Result<String> {
+    let truth = truth.map_or(Ok(String::new()), |truth| truth::section(r, truth))?;
+    let body = sections.to_owned() + &truth + &provenance(&r.specimen);
     Ok(page::page(&r.specimen.name, &made_from(&r.specimen, "Reconstruction"), &body))
 }
 
@@ -48,12 +41,11 @@ pub fn reconstruction(r: &Reconstruction, truth_dir: Option<&Path>) -> Result<St
 /// Images of different sizes, a picture that cannot be encoded.
 pub fn reconstruction_sections(r: &Reconstruction) -> Result<String> {
     images::check_sizes(r)?;
-    let specimen = &r.specimen;
-    Ok(images::overview(r)
-        + &images::images(r)?
-        + &bodies::section(specimen, true)?
-        + &images::depth_errors(r)?
-        + &notes(&r.notes))
+    let surfaces = organ_views::surfaces(&r.specimen);
+    let bodies = || bodies::section(&r.specimen, &surfaces, true);
+    let (images, (bodies, depth_errors)) =
+        rayon::join(|| images::images(r, &surfaces), || rayon::join(bodies, || images::depth_errors(r)));
+    Ok(images::overview(r) + &images? + &bodies? + &depth_errors? + &notes(&r.notes))
 }
 
 /// The page of a specimen made from a surface file.
@@ -78,7 +70,7 @@ pub fn surface(s: &Specimen, repair: &RepairReport) -> Result<String> {
     .into_iter()
     .flatten()
     .collect();
-    let body = bodies::section(s, false)?
+    let body = bodies::section(s, &organ_views::surfaces(s), false)?
         + &page::section("Surface file", "Defects of the surface and their repair.", &page::list(&lines))
         + &provenance(s);
     Ok(page::page(&s.name, &made_from(s, "Organ"), &body))
@@ -90,7 +82,7 @@ pub(crate) fn lift(s: &Specimen, lifted: &FinishedLift, before: Option<&str>) ->
     let (outcome, details) = lift::sections(lifted)?;
     let body = match before {
         Some(before) => outcome + before + &details,
-        None => outcome + &bodies::section(s, s.camera.is_some())? + &details,
+        None => outcome + &bodies::section(s, &organ_views::surfaces(s), s.camera.is_some())? + &details,
     };
     let summary = &lifted.recording.summary;
     let done = if summary.cuts > 0 { "grasp, lift and cut" } else { "grasp and lift" };

@@ -2,10 +2,14 @@
 
 use glam::DVec3;
 use trocar_geometry::TetMesh;
-use trocar_render::phong::{Instance, Shading};
-use trocar_report::colors;
+use trocar_render::phong::{Instance, PhongScene, Shading};
+use trocar_report::colors::{self, VIEW_GROUND};
 use trocar_report::views::shell;
 use trocar_specimen::Specimen;
+
+/// Rays of ambient occlusion at a vertex, and how far they look (m).
+const OCCLUSION_RAYS: usize = 24;
+const OCCLUSION_REACH: f64 = 0.012;
 
 /// Directions for views of a specimen.
 #[derive(Clone, Copy, Debug)]
@@ -41,13 +45,14 @@ impl Directions {
     }
 }
 
-/// The organs' coloured surfaces.
-pub fn surfaces(specimen: &Specimen) -> Vec<Instance> {
+/// The organs' coloured surfaces, lit from the camera.
+pub fn surfaces(specimen: &Specimen) -> PhongScene {
     let instance = |(i, organ): (usize, &trocar_specimen::Organ)| {
         let shading = Shading { color: colors::organ(i), gloss: 0.35, wireframe: false };
         Instance { mesh: organ.surface.clone(), label: label(i), shading }
     };
-    specimen.organs.iter().enumerate().map(instance).collect()
+    let instances = specimen.organs.iter().enumerate().map(instance).collect();
+    PhongScene::new(instances, None, VIEW_GROUND).with_ambient_occlusion(OCCLUSION_RAYS, OCCLUSION_REACH)
 }
 
 /// Label of organ `index` in a scene.
@@ -57,14 +62,14 @@ pub fn label(index: usize) -> u16 {
 
 /// The tetrahedra of every organ as wires in its colour. `cut` is a direction: the half of each
 /// organ on that side of the middle of its nodes is removed. Cut faces are lighter.
-pub fn wires(specimen: &Specimen, nodes: &[Vec<DVec3>], cut: Option<DVec3>) -> Vec<Instance> {
+pub fn wires(specimen: &Specimen, nodes: &[Vec<DVec3>], cut: Option<DVec3>) -> PhongScene {
     let instance = |(i, (organ, nodes)): (usize, (&trocar_specimen::Organ, &Vec<DVec3>))| {
         let color = colors::organ(i);
         let body = TetMesh { vertices: nodes.clone(), tets: organ.body.tets.clone() };
         let mesh = shell(&body, cut, color, colors::mix(color, [255; 3], 0.62));
         Instance { mesh, label: label(i), shading: Shading { color, gloss: 0.0, wireframe: true } }
     };
-    specimen.organs.iter().zip(nodes).enumerate().map(instance).collect()
+    PhongScene::new(specimen.organs.iter().zip(nodes).enumerate().map(instance).collect(), None, VIEW_GROUND)
 }
 
 /// Rest positions of every organ's nodes.

@@ -2,7 +2,6 @@
 
 use crate::Result;
 use crate::truth::{Part, Truth};
-use std::path::Path;
 use trocar_camera::{DepthImage, Mask};
 use trocar_reconstruct::Reconstruction;
 use trocar_report::document::Table;
@@ -10,12 +9,9 @@ use trocar_report::overlays;
 use trocar_report::page::{self, Columns};
 use trocar_report::{colors::DIVERGING, figures, table};
 
-/// The section; empty if `dir` (the folder of the truth, or the recording with it as `truth/`)
-/// has neither `color.png` nor `depth.png`.
-pub(super) fn section(r: &Reconstruction, dir: &Path) -> Result<String> {
-    let Some(truth) = Truth::read(r, dir)? else { return Ok(String::new()) };
-    let (color, depth) = (&truth.color, &truth.depth);
-    let parts = truth.parts(r);
+/// The section.
+pub(super) fn section(r: &Reconstruction, truth: &Truth) -> Result<String> {
+    let Truth { color, depth, parts } = truth;
     let mut figures = Vec::new();
     if let Some(truth) = color {
         let caption = "<b>Truth.</b> The phantom without instruments and without noise.";

@@ -93,7 +93,8 @@ pub(super) fn deforming(
     recorded(PHANTOM, &options, &folder.join("recording"), progress)?;
     let recording = Recording::open(&folder.join("recording"))?;
     let made =
-        reconstruct_recording(&folder.join("recording"), &Settings::default(), &folder.join("specimen"), progress)?.1;
+        reconstruct_recording(&folder.join("recording"), &Settings::default(), &folder.join("specimen"), progress)?
+            .reconstruction;
     let appendix = LoneOrgan::of(&made.specimen, ORGAN)?;
     let seen: Vec<(usize, SeenLift)> = measure_recording(&recording, progress)?
         .lifts
@@ -244,7 +245,8 @@ mod tests {
         let options = RecordOptions { frames: 2, ..RecordOptions::default() };
         recorded(PHANTOM, &options, &folder, &Silent).unwrap();
         let settings = Settings::default();
-        let made = reconstruct_recording(&folder, &settings, &dir.path().join("specimen"), &Silent).unwrap().1;
+        let made =
+            reconstruct_recording(&folder, &settings, &dir.path().join("specimen"), &Silent).unwrap().reconstruction;
         let recording = Recording::open(&folder).unwrap();
 
         let beside = DVec3::new(8e-3, 0.0, 0.0);

@@ -74,7 +74,8 @@ impl Study for SimilarityExperiment {
             let folder = output.join(phantom);
             let recording = folder.join("recording");
             recorded(phantom, &self.recorded.options(), &recording, progress)?;
-            let made = reconstruct_recording(&recording, &Settings::default(), &folder.join("specimen"), progress)?.1;
+            let made = reconstruct_recording(&recording, &Settings::default(), &folder.join("specimen"), progress)?
+                .reconstruction;
             let lamp = Illumination::Lamp { beside: 0.0 };
             rows.push(self.beside_recording(
                 phantom,
@@ -91,7 +92,8 @@ impl Study for SimilarityExperiment {
         let mug = output.join(real::MUG);
         if real::prepare_mug(&self.data, &mug.join("recording"))? {
             let recording = mug.join("recording");
-            let made = reconstruct_recording(&recording, &Settings::default(), &mug.join("specimen"), progress)?.1;
+            let made = reconstruct_recording(&recording, &Settings::default(), &mug.join("specimen"), progress)?
+                .reconstruction;
             let note = "masks: an outline by hand; light: even, as in the room";
             rows.push(self.beside_recording(real::MUG, &mug, &made, Illumination::Room, note, progress)?);
             oblique.push(through_endoscope(self.samples, real::MUG, &mug, &made, Illumination::Room, note, progress)?);

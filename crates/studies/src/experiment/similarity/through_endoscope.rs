@@ -29,7 +29,8 @@ pub(super) fn from_the_side(
     std::fs::create_dir_all(&folder).map_err(|source| crate::Error::Io { path: folder.clone(), source })?;
     let recording = folder.join("recording");
     oblique::record(&output.join(phantom).join("recording"), &recording, samples, progress)?;
-    let made = reconstruct_recording(&recording, &Settings::default(), &folder.join("specimen"), progress)?.1;
+    let made =
+        reconstruct_recording(&recording, &Settings::default(), &folder.join("specimen"), progress)?.reconstruction;
     let light = Illumination::Lamp { beside: BESIDE_LENS };
     let note = "masks: the truth; light: the endoscope's";
     through_endoscope(samples, &name, &folder, &made, light, note, progress)
