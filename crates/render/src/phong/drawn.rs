@@ -49,7 +49,7 @@ struct Drawing {
 /// The samples of a row.
 #[derive(Default)]
 pub(super) struct Row {
-    /// World directions of the rays, with z = 1 in the camera's frame.
+    /// World directions of the rays, with z = 1 in the camera's frame; zero beside all triangles.
     pub directions: Vec<DVec3>,
     pub hits: Vec<Option<Hit>>,
     /// Samples for which several triangles are equally near.
@@ -68,7 +68,11 @@ impl<'a> Hits<'a> {
     pub fn row(&self, row: usize, out: &mut Row) {
         let v = self.place(row);
         out.directions.clear();
-        out.directions.extend((0..self.columns).map(|column| self.view.direction(self.place(column), v)));
+        out.directions.resize(self.columns, DVec3::ZERO);
+        let [first, end] = self.drawing.as_ref().map_or([0, self.columns], |drawing| drawing.columns(row));
+        for column in first..end {
+            out.directions[column] = self.view.direction(self.place(column), v);
+        }
         let origin = self.view.pose.translation;
         let traced = |direction: &DVec3| self.tracer.first(origin, *direction, f64::INFINITY);
         out.hits.clear();
@@ -121,19 +125,28 @@ impl Drawing {
         Self { covered, lists, first }
     }
 
+    /// The triangles that a row of samples may show, and their boxes.
+    fn of_row(&self, row: usize) -> impl Iterator<Item = (u32, Covered)> {
+        let list = &self.lists[self.first[row / BAND]..self.first[row / BAND + 1]];
+        let covered = |triangle: &u32| (*triangle, self.covered[*triangle as usize]);
+        list.iter().map(covered).filter(move |(_, c)| (c.rows[0]..=c.rows[1]).contains(&(row as u32)))
+    }
+
+    /// The columns of a row that may show a triangle: the first, and the one after the last.
+    fn columns(&self, row: usize) -> [usize; 2] {
+        let ends = self.of_row(row).map(|(_, c)| [c.columns[0] as usize, c.columns[1] as usize + 1]);
+        ends.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or([0, 0])
+    }
+
     /// Draws what of the triangles is in a row of samples.
     fn draw(&self, tracer: &Tracer, origin: DVec3, row: usize, out: &mut Row) {
-        for triangle in &self.lists[self.first[row / BAND]..self.first[row / BAND + 1]] {
-            let Covered { columns, rows } = self.covered[*triangle as usize];
-            if (row as u32) < rows[0] || row as u32 > rows[1] {
-                continue;
-            }
-            let corners = &tracer.corners()[*triangle as usize];
+        for (triangle, Covered { columns, .. }) in self.of_row(row) {
+            let corners = &tracer.corners()[triangle as usize];
             for column in columns[0] as usize..=columns[1] as usize {
                 let Some((t, u, v)) = intersect(corners, origin, out.directions[column]) else { continue };
                 let nearest = out.hits[column].map_or(f64::INFINITY, |hit| hit.t);
                 if t > 0.0 && t < nearest {
-                    out.hits[column] = Some(Hit { triangle: *triangle, t, u, v });
+                    out.hits[column] = Some(Hit { triangle, t, u, v });
                     out.ties[column] = false;
                 } else if t == nearest {
                     out.ties[column] = true;

@@ -6,6 +6,7 @@ use super::trace::{Hit, Tracer};
 use crate::srgb;
 use glam::DVec3;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 use trocar_camera::{Camera, ColorImage, DepthImage, Mask};
 use trocar_core::Pose;
 use trocar_geometry::TriMesh;
@@ -61,10 +62,19 @@ pub struct PhongScene {
     normals: Vec<DVec3>,
     /// Linear base colour per vertex.
     albedo: Vec<[f32; 3]>,
-    /// Ambient visibility per vertex; empty without ambient occlusion.
-    open: Vec<f32>,
+    /// Unit normal per triangle.
+    flat: Vec<DVec3>,
+    occlusion: Option<Occlusion>,
     light: Option<DVec3>,
     background: [u8; 3],
+}
+
+/// Ambient occlusion: what [`PhongScene::with_ambient_occlusion`] was given, and the ambient
+/// visibility of each vertex that was seen.
+struct Occlusion {
+    rays: usize,
+    reach: f64,
+    open: Vec<OnceLock<f32>>,
 }
 
 /// A rendered image with its depth and labels.
@@ -114,7 +124,8 @@ impl PhongScene {
             positions: Vec::new(),
             normals: Vec::new(),
             albedo: Vec::new(),
-            open: Vec::new(),
+            flat: Vec::new(),
+            occlusion: None,
             light,
             background,
         };
@@ -141,33 +152,43 @@ impl PhongScene {
         }
         let corners: Vec<_> = scene.triangles.iter().map(|(_, t)| t.map(|v| scene.positions[v as usize])).collect();
         scene.tracer = Tracer::new(&corners);
+        scene.flat = corners.iter().map(|[a, b, c]| (b - a).cross(c - a).normalize_or_zero()).collect();
         scene
     }
 
     /// Adds ambient occlusion: `rays` rays per vertex look for surfaces closer than `reach` (m).
-    /// The meshes must be fine compared with `reach`.
+    /// The meshes must be fine compared with `reach`. Only vertices that a picture shows cost time.
     pub fn with_ambient_occlusion(mut self, rays: usize, reach: f64) -> Self {
-        const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
-        let seen = |index: usize| {
-            let normal = self.normals[index];
-            if normal == DVec3::ZERO || rays == 0 {
-                return 1.0;
-            }
-            let (x, y) = normal.any_orthonormal_pair();
-            let origin = self.positions[index] + normal * (0.02 * reach);
-            // A spiral over the cosine-weighted hemisphere. It starts at a different angle for each
-            // vertex, so no pattern shows.
-            let turn = index as f64 * 1.324_717_957_244_746;
-            let free = (0..rays).filter(|&k| {
-                let r2 = (k as f64 + 0.5) / rays as f64;
-                let (sin, cos) = (k as f64 * GOLDEN_ANGLE + turn).sin_cos();
-                let direction = (x * cos + y * sin) * r2.sqrt() + normal * (1.0 - r2).sqrt();
-                !self.tracer.blocked(origin, direction, reach)
-            });
-            free.count() as f32 / rays as f32
-        };
-        self.open = (0..self.positions.len()).into_par_iter().map(seen).collect();
+        let open = self.positions.iter().map(|_| OnceLock::new()).collect();
+        self.occlusion = Some(Occlusion { rays, reach, open });
         self
+    }
+
+    /// Ambient visibility of a vertex, in [0, 1].
+    fn open(&self, vertex: usize) -> f32 {
+        let Some(Occlusion { rays, reach, open }) = &self.occlusion else { return 1.0 };
+        *open[vertex].get_or_init(|| self.unoccluded(vertex, *rays, *reach))
+    }
+
+    /// The share of a vertex's rays that meet no surface.
+    fn unoccluded(&self, vertex: usize, rays: usize, reach: f64) -> f32 {
+        const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+        let normal = self.normals[vertex];
+        if normal == DVec3::ZERO || rays == 0 {
+            return 1.0;
+        }
+        let (x, y) = normal.any_orthonormal_pair();
+        let origin = self.positions[vertex] + normal * (0.02 * reach);
+        // A spiral over the cosine-weighted hemisphere. It starts at a different angle for each
+        // vertex, so no pattern shows.
+        let turn = vertex as f64 * 1.324_717_957_244_746;
+        let free = (0..rays).filter(|&k| {
+            let r2 = (k as f64 + 0.5) / rays as f64;
+            let (sin, cos) = (k as f64 * GOLDEN_ANGLE + turn).sin_cos();
+            let direction = (x * cos + y * sin) * r2.sqrt() + normal * (1.0 - r2).sqrt();
+            !self.tracer.blocked(origin, direction, reach)
+        });
+        free.count() as f32 / rays as f32
     }
 
     /// Renders through `camera` at `pose` (camera to world). Colour averages `samples` x `samples`
@@ -201,7 +222,7 @@ impl PhongScene {
                 let (instance, _) = self.triangles[hit.triangle as usize];
                 depth[u] = hit.t as f32;
                 labels[u] = self.looks[instance as usize].0;
-                facing[u] = self.flat_normal(hit).dot(direction.normalize()).abs() as f32;
+                facing[u] = self.flat[hit.triangle as usize].dot(direction.normalize()).abs() as f32;
             }
             let Some(within) = &within else {
                 for (color, (direction, hit)) in color.iter_mut().zip(row.directions.iter().zip(&row.hits)) {
@@ -225,12 +246,6 @@ impl PhongScene {
         frame
     }
 
-    /// Unit normal of the triangle that was hit.
-    fn flat_normal(&self, hit: &Hit) -> DVec3 {
-        let [a, b, c] = self.triangles[hit.triangle as usize].1.map(|v| self.positions[v as usize]);
-        (b - a).cross(c - a).normalize_or_zero()
-    }
-
     /// Linear radiance along `direction`.
     fn light_of(&self, view: &View<'_>, direction: DVec3, hit: Option<Hit>) -> [f32; 3] {
         let Some(hit) = hit else { return srgb::to_linear(self.background) };
@@ -240,7 +255,7 @@ impl PhongScene {
         let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
 
         let to_eye = -direction.normalize();
-        let flat = self.flat_normal(&hit);
+        let flat = self.flat[hit.triangle as usize];
         let side = if flat.dot(to_eye) < 0.0 { -1.0 } else { 1.0 };
         let smooth = weights[0] * self.normals[a] + weights[1] * self.normals[b] + weights[2] * self.normals[c];
         let normal = side * smooth.try_normalize().unwrap_or(flat);
@@ -254,7 +269,7 @@ impl PhongScene {
         });
         let w = weights.map(|w| w as f32);
         let mixed = |of: &dyn Fn(usize) -> f32| w[0] * of(a) + w[1] * of(b) + w[2] * of(c);
-        let open = if self.open.is_empty() { 1.0 } else { mixed(&|i| self.open[i]) };
+        let open = if self.occlusion.is_none() { 1.0 } else { mixed(&|i| self.open(i)) };
         let albedo = [0, 1, 2].map(|k| mixed(&|i| self.albedo[i][k]));
         let light = shade(&Lit { albedo, normal, to_eye, to_light, shadowed, open, gloss: shading.gloss });
         if !shading.wireframe {

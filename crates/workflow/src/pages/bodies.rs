@@ -16,7 +16,7 @@ pub(super) fn section(s: &Specimen, surfaces: &PhongScene, beside_paper: bool) -
     let points: Vec<DVec3> =
         s.organs.iter().flat_map(|o| o.surface.vertices.iter().chain(&o.body.vertices).copied()).collect();
     let d = Directions::of(s);
-    let size = (800, 520);
+    let size = (640, 416);
     let oblique = View::framing(&points, d.oblique(), d.up, size);
     let low = View::framing(&points, d.low(), d.up, size);
     let rest = organ_views::rest(s);
