@@ -119,8 +119,8 @@ impl DepthImage {
     /// A file that cannot be written.
     pub fn write_png(&self, path: &Path, scale: f64) -> Result<()> {
         let quantise = |d: &f32| {
-            let units = (f64::from(*d) / scale).round();
-            if units >= 1.0 && units <= f64::from(u16::MAX) { units as u16 } else { 0 }
+            let units = f64::from(*d) / scale + 0.5;
+            if units >= 1.0 && units < f64::from(u16::MAX) + 1.0 { units as u16 } else { 0 }
         };
         let bytes: Vec<u8> = self.depth.iter().flat_map(|d| quantise(d).to_be_bytes()).collect();
         write(path, &encode(self.width, self.height, png::ColorType::Grayscale, png::BitDepth::Sixteen, &bytes)?)

@@ -130,8 +130,8 @@ pub struct Demo {
     /// Folder for all results of the demo.
     #[arg(short, long, default_value = "trocar-demo")]
     pub output: PathBuf,
-    /// Frames of the recording.
-    #[arg(long, default_value_t = 91)]
+    /// Frames of the recording, at 30 Hz.
+    #[arg(long, default_value_t = 61)]
     pub frames: usize,
     /// Seed of the anatomy and of the camera's noise.
     #[arg(long, default_value_t = 1)]

@@ -54,18 +54,20 @@ pub(crate) fn add_noise(color: &mut ColorImage, depth: &mut DepthImage, facing: 
             if z <= 0.0 {
                 continue;
             }
-            let mut nearby =
-                [(u > 0, -1), (u + 1 < width, 1), (v > 0, -(width as isize)), (v + 1 < height, width as isize)]
-                    .into_iter()
-                    .filter(|(inside, _)| *inside)
-                    .map(|(_, step)| clean[i.wrapping_add_signed(step)]);
-            let edge = nearby.any(|near| (near - z).abs() > EDGE);
+            // A pixel of the rim is its own neighbour beyond.
+            let left = clean[i - usize::from(u > 0)];
+            let right = clean[i + usize::from(u + 1 < width)];
+            let above = clean[if v > 0 { i - width } else { i }];
+            let below = clean[if v + 1 < height { i + width } else { i }];
+            let edge = [left, right, above, below].map(|near| (near - z).abs() > EDGE).contains(&true);
             let steep = f64::from((GRAZING - facing[i]) / GRAZING).max(0.0);
             let kept = (1.0 - SPECKLE) * (1.0 - steep) * if edge { 1.0 - EDGE_LOSS } else { 1.0 };
             let sigma = DEPTH_SIGMA * (z / 0.2).powi(2);
-            let noisy = f64::from(z + sigma * normal(next()));
-            depth.depth[i] =
-                if unit(next()) < kept { ((noisy / DEPTH_SCALE).round() * DEPTH_SCALE) as f32 } else { 0.0 };
+            let units = f64::from(z + sigma * normal(next())) / DEPTH_SCALE;
+            // The nearest whole number, as below.
+            let whole = f64::from(units as u32);
+            let units = if units - whole >= 0.5 { whole + 1.0 } else { whole };
+            depth.depth[i] = if unit(next()) < kept { (units * DEPTH_SCALE) as f32 } else { 0.0 };
         }
     }
 }

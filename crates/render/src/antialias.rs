@@ -7,8 +7,7 @@ use crate::film::Film;
 use crate::lanes::LANES;
 use crate::picture::Picture;
 use crate::preview::ROWS;
-use crate::raster::{View, Visibility};
-use crate::stage::Stage;
+use crate::raster::Visibility;
 use crate::visibility::Drawing;
 use rayon::prelude::*;
 
@@ -16,7 +15,7 @@ use rayon::prelude::*;
 pub(crate) const FINER: usize = 2;
 
 /// Difference from a neighbour, of 255 levels of a channel, above which a pixel is refined.
-const CONTRAST: u8 = 10;
+const CONTRAST: u8 = 20;
 
 /// The points of pixels that are refined, in a picture of [`FINER`] times as many rows and columns.
 pub(crate) struct Marks {
@@ -69,22 +68,19 @@ impl Marks {
     }
 }
 
-/// Refines a preview of `stage` through `view`. `points` is memory for what its points show.
+/// Refines a preview. `drawing` is that of its points, and `points` memory for what they show.
 pub(crate) fn antialias(
     picture: &mut Picture,
-    stage: &Stage,
-    view: &View<'_>,
+    drawing: &Drawing<'_>,
     shadows: bool,
     film: &Film,
     points: &mut Visibility,
 ) {
     let marks = Marks::of(picture);
-    let width = picture.color.width;
-    let fine = View { rays: view.rays.finer(), ..*view };
-    let drawing = Drawing { stage, view: &fine, drawn: &|_| true, behind: None };
-    let shading = Shading { shadows, marks: Some(&marks), ..Shading::new(stage, &fine) };
+    let (width, rays) = (picture.color.width, drawing.view.rays);
+    let shading = Shading { shadows, marks: Some(&marks), ..Shading::new(drawing.stage, drawing.view) };
     let rows = picture.color.pixels.par_chunks_mut((width * ROWS / FINER).max(1));
-    let bands = rows.zip(points.bands(fine.rays, ROWS)).enumerate();
+    let bands = rows.zip(points.bands(rays, ROWS)).enumerate();
     let memory = || (Buffers::new(), Picture::new(FINER * width, ROWS));
     bands.for_each_init(memory, |(buffers, lit), (k, (colors, seen))| {
         let (first, count) = (k * ROWS, FINER * colors.len() / width);
@@ -94,7 +90,7 @@ pub(crate) fn antialias(
         drawing.draw(first, seen.depth, seen.triangle);
         let mut rows = lit.first_rows(count);
         shading.shade(first, &seen, &mut rows, buffers);
-        rows.develop_parts(film, fine.rays, first, &buffers.shaded);
+        rows.develop_parts(film, rays, first, &buffers.shaded);
         for (v, row) in colors.chunks_mut(width).enumerate() {
             for (u, color) in row.iter_mut().enumerate().filter(|(u, _)| marks.has(*u, first / FINER + v)) {
                 let at = FINER * (v * FINER * width + u);

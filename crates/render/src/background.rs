@@ -38,6 +38,8 @@ pub(crate) struct Background {
     bodies: Vec<Rest>,
     /// Bodies that are drawn.
     visibility: Option<Visibility>,
+    /// The same at the points of the pixels, if a picture with smooth edges has asked for it.
+    points: Option<Visibility>,
     /// The light of the last picture.
     look: Option<Look>,
     /// Light of the drawn bodies with that look.
@@ -107,6 +109,7 @@ impl Background {
             origin: view.origin,
             bodies: changes.map(|change| Rest { change, pictures: REST - 1, needed: REST, is_drawn: false }).collect(),
             visibility: None,
+            points: None,
             look: None,
             picture: None,
         }
@@ -154,12 +157,25 @@ impl Background {
     pub fn keep(&mut self, drawn: Visibility) -> Option<(Visibility, Picture)> {
         self.bodies.iter_mut().for_each(|b| b.is_drawn = b.rests());
         let kept = self.bodies.iter().any(|b| b.is_drawn).then_some(drawn);
+        self.points = None;
         std::mem::replace(&mut self.visibility, kept).zip(self.picture.take())
     }
 
     /// The bodies at rest.
     pub fn visibility(&self) -> Option<&Visibility> {
         self.visibility.as_ref()
+    }
+
+    /// Keeps what `draw` draws of the bodies at the points of the pixels, if they have no points yet.
+    pub fn keep_points(&mut self, draw: impl FnOnce(&Self) -> Visibility) {
+        if self.visibility.is_some() && self.points.is_none() {
+            self.points = Some(draw(self));
+        }
+    }
+
+    /// The bodies at rest at the points of the pixels.
+    pub fn points(&self) -> Option<&Visibility> {
+        self.points.as_ref()
     }
 
     /// The bodies at rest, to be lit.

@@ -25,6 +25,7 @@ pub(crate) fn preview(
 ) {
     let mut memory = std::mem::take(&mut stage.memory);
     let mut visibility = std::mem::take(&mut memory.visibility);
+    let mut points = std::mem::take(&mut memory.points);
     let background = memory.background(view, stage.changes());
     keep(background, stage, view, film);
     let drawn = |body| !background.rests(body);
@@ -49,8 +50,22 @@ pub(crate) fn preview(
         });
     }
     if smooth {
-        antialias(picture, stage, view, casts, film, &mut memory.points);
+        let view = &View { rays: view.rays.finer(), ..*view };
+        background.keep_points(|background| {
+            let mut at_rest = Visibility::default();
+            draw(&mut at_rest, &Drawing { stage, view, drawn: &|body| background.shows(body), behind: None });
+            at_rest
+        });
+        let drawn = |body| !background.shows(body);
+        antialias(
+            picture,
+            &Drawing { stage, view, drawn: &drawn, behind: background.points() },
+            casts,
+            film,
+            &mut points,
+        );
     }
+    memory.points = points;
     memory.visibility = visibility;
     stage.memory = memory;
 }
