@@ -239,15 +239,17 @@ fn eye_inside_of_a_closed_body_sees_its_inside() {
 
 #[test]
 fn raster_does_not_depend_on_thread_count() {
-    let picture = |threads: usize| {
+    let picture = |threads: usize, settings: RenderSettings| {
         let mut stage = stage();
         stage.lights = vec![Light::endoscope(&Pose::IDENTITY, 0.03, 0.12)];
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let rays = RayGenerator::new(Camera::centred(301, 207, 1.2));
-        pool.install(|| render(&mut stage, &rays, &Pose::IDENTITY, &RenderSettings::preview(), &Film::endoscope()))
+        pool.install(|| render(&mut stage, &rays, &Pose::IDENTITY, &settings, &Film::endoscope()))
     };
-    let one = picture(1);
-    assert!(one == picture(2) && one == picture(5));
+    for settings in [RenderSettings::preview(), RenderSettings::Smooth] {
+        let one = picture(1, settings);
+        assert!(one == picture(2, settings) && one == picture(5, settings));
+    }
 }
 
 /// What a stage keeps between pictures does not change them: bodies rest and move, deform, are lit
@@ -293,7 +295,10 @@ fn pictures_do_not_depend_on_earlier_ones() {
         let noise = (frame % 7 == 3).then_some(Noise { shot: 0.015, read: 0.003, seed: 1, frame });
         let film = Film { noise, ..Film::endoscope() };
         let (rays, pose) = &eyes[if frame % 10 == 9 { 1 + usize::from(frame % 20 == 9) } else { 0 }];
-        let settings = RenderSettings::Preview { shadows: frame % 9 == 4 };
+        let settings = match frame % 9 {
+            2 | 7 => RenderSettings::Smooth,
+            kind => RenderSettings::Preview { shadows: kind == 4 },
+        };
         render_into(&mut quick, &mut stage, rays, pose, &settings, &film);
         assert!(quick == render(&mut stage.clone(), rays, pose, &settings, &film), "frame {frame}");
         let expected = if frame >= 60 || (frame >= 20 && frame % 2 == 1) { 99 } else { 98 };
