@@ -26,6 +26,7 @@ mod pipeline;
 mod resample;
 mod settings;
 mod thickness;
+pub mod truth;
 
 pub use check::{DepthCheck, check as depth_error};
 pub use composite::{Composite, CompositeTimes};

@@ -12,14 +12,6 @@ pub enum Error {
     /// An input or option is wrong.
     #[error("{0}")]
     Mismatch(String),
-    /// The truth of a recording does not match the recording.
-    #[error("{path}: {reason}", path = path.display())]
-    Truth {
-        /// The file.
-        path: PathBuf,
-        /// The reason and the remedy.
-        reason: String,
-    },
     /// A file or folder exists and is not overwritten.
     #[error("{path} {reason}", path = path.display())]
     Exists {

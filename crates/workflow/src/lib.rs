@@ -23,7 +23,6 @@ mod solvers;
 mod specimen_cache;
 pub mod specimen_scene;
 pub mod surfaces;
-pub mod truth;
 pub mod video;
 
 pub use counted::counted;
@@ -45,7 +44,6 @@ pub use solvers::{SOLVERS, solver_named};
 pub use specimen_cache::{SpecimenCache, drawn_specimens};
 pub use surfaces::{RecordedEpisode, SURFACES_FILE, SurfaceRecorder, SurfaceWatch};
 pub use trocar_task::{Header as EpisodeHeader, SweepRow};
-pub use truth::TruthFigures;
 
 /// Hash of the sources that an episode depends on.
 pub const EPISODE_SOURCE_HASH: &str = env!("TROCAR_EPISODE_SOURCE_HASH");

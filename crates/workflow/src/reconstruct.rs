@@ -1,12 +1,12 @@
 //! The commands' work from folder to folder: read, run, write the result and its report.
 
-use crate::truth::{Truth, TruthFigures};
 use crate::{Error, Result, check_interrupted, pages};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
 use trocar_core::Progress;
 use trocar_geometry::io::Unit;
+use trocar_reconstruct::truth::{Truth, TruthFigures};
 use trocar_reconstruct::{Reconstruction, Settings};
 use trocar_recording::Recording;
 use trocar_specimen::{OrganFacts, Specimen, StagedFolder};

@@ -8,11 +8,11 @@ use std::path::Path;
 use trocar_camera::{Camera, ColorImage, DepthImage, Distortion, Mask};
 use trocar_core::Pose;
 use trocar_geometry::{RepairReport, TetMesh, TetQuality, TriMesh};
+use trocar_reconstruct::truth::Truth;
 use trocar_reconstruct::{Composite, CompositeTimes, OrganView, Reconstruction};
 use trocar_render::phong::{Instance, PhongScene, Shading};
 use trocar_specimen::{Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 use trocar_workflow::pages as report;
-use trocar_workflow::truth::Truth;
 
 /// A name that would break a page that does not escape it.
 const HOSTILE: &str = "<script>alert('x')</script>&\"";

@@ -11,6 +11,7 @@ use trocar_camera::DepthImage;
 use trocar_core::Pose;
 use trocar_geometry::io::{Unit, read_surface};
 use trocar_phantom::RecordOptions;
+use trocar_reconstruct::truth::DEPTH_UNIT;
 use trocar_reconstruct::{BackRule, Reconstruction, Settings, SurfaceRule, depth_error, modelled_volume};
 use trocar_recording::Recording;
 use trocar_report::document::{Document, Section, Table};
@@ -20,7 +21,6 @@ use trocar_report::{colors, figures, overlays};
 use trocar_workflow::pages::{check_sizes, organ_views};
 use trocar_workflow::paper::table_i;
 use trocar_workflow::phantoms::recorded;
-use trocar_workflow::truth::DEPTH_UNIT;
 use trocar_workflow::{CompositeFigures, reconstruct_recording};
 
 /// Table I and Fig. 6(a): all phantoms recorded, reconstructed and compared with their truth.

@@ -6,7 +6,6 @@ mod truth;
 
 pub use truth::{LiftTruthFigures, against_truth};
 
-use crate::truth::quantile;
 use crate::{Error, Result};
 use episode_film::EpisodeFilm;
 pub use film_file::FilmFile;
@@ -17,6 +16,7 @@ use trocar_camera::Mask;
 use trocar_core::Progress;
 use trocar_measure::{LiftFigures, Line, MeasuredLift, RecordingFilm};
 use trocar_phantom::LiftsTruth;
+use trocar_reconstruct::truth::quantile;
 use trocar_recording::{LiftInfo, Recording};
 use trocar_task::EPISODE_FILE;
 

@@ -1,6 +1,5 @@
 //! Measured lifts of a phantom against their truth.
 
-use crate::truth::quantile;
 use crate::{Error, Result};
 use glam::DVec3;
 use serde::Serialize;
@@ -8,6 +7,7 @@ use std::path::Path;
 use trocar_geometry::{MeshDistance, TriMesh};
 use trocar_measure::{LiftProfile, MeasuredLift, SPACING};
 use trocar_phantom::LiftTruth;
+use trocar_reconstruct::truth::quantile;
 
 /// A measured lift beside its truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -80,7 +80,7 @@ fn tracking_errors(lift: &MeasuredLift, known: &LiftTruth, surfaces: &[TriMesh])
 /// The profile of the true front over the measured plane, at the measured peak.
 fn true_profile(lift: &MeasuredLift, known: &LiftTruth, number: usize, truth: &Path) -> Result<Option<LiftProfile>> {
     let path = truth.join(format!("lift-{number}")).join("centreline.csv");
-    let wrong = |e: csv::Error| Error::Truth { path: path.clone(), reason: e.to_string() };
+    let wrong = |e: csv::Error| Error::Mismatch(format!("{}: {e}", path.display()));
     let mut heights: [Vec<f64>; 2] = Default::default();
     let mut reader = csv::Reader::from_path(&path).map_err(wrong)?;
     for row in reader.deserialize() {

@@ -1,10 +1,10 @@
 //! Sections on the recorded images and the fit: input frame, composite, masks, and depth errors of
 //! the surfaces.
 
-use crate::truth::quantile;
 use crate::{Error, Result};
 use trocar_core::Pose;
 use trocar_reconstruct::Reconstruction;
+use trocar_reconstruct::truth::quantile;
 use trocar_render::phong::PhongScene;
 use trocar_report::colors::{self, DIVERGING, INSTRUMENT, SEQUENTIAL};
 use trocar_report::page::{self, Card, Columns};

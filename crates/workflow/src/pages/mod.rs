@@ -14,10 +14,10 @@ mod over_time;
 mod truth;
 
 use crate::lift_result::FinishedLift;
-use crate::truth::Truth;
 use crate::{Result, counted};
 use trocar_geometry::RepairReport;
 use trocar_reconstruct::Reconstruction;
+use trocar_reconstruct::truth::Truth;
 use trocar_report::{page, table};
 use trocar_specimen::Specimen;
 

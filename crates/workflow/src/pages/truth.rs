@@ -1,9 +1,9 @@
 //! The section that compares the composite with the truth of a phantom.
 
 use crate::Result;
-use crate::truth::{Part, Truth};
 use trocar_camera::{DepthImage, Mask};
 use trocar_reconstruct::Reconstruction;
+use trocar_reconstruct::truth::{Part, Truth};
 use trocar_report::document::Table;
 use trocar_report::overlays;
 use trocar_report::page::{self, Columns};

@@ -10,10 +10,10 @@ use std::path::Path;
 use trocar_camera::{ColorImage, DepthImage, DepthNoise, Mask};
 use trocar_core::{Pose, Progress};
 use trocar_geometry::io::{Unit, read_surface};
+use trocar_reconstruct::truth::DEPTH_UNIT;
 use trocar_recording::{InstrumentRule, OrganInfo, Recording, RecordingInfo, RecordingWriter};
 use trocar_render::{Appearance, Film, Light, Noise, RayGenerator, RenderSettings, Stage, render};
 use trocar_workflow::check_interrupted;
-use trocar_workflow::truth::DEPTH_UNIT;
 
 /// Width of the pictures (px).
 const WIDTH: usize = 848;

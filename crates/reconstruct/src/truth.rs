@@ -1,10 +1,9 @@
 //! Compares the composite with the instrument-free truth of a phantom.
 
-use crate::{Error, Result};
+use crate::{Error, Reconstruction, Result};
 use serde::Serialize;
 use std::path::Path;
 use trocar_camera::{ColorImage, DepthImage};
-use trocar_reconstruct::Reconstruction;
 
 /// Unit of a phantom's truth depth (m).
 pub const DEPTH_UNIT: f64 = 1e-4;
@@ -60,7 +59,7 @@ impl Truth {
                 return Ok(());
             }
             let reason = format!("it has {width} x {height} pixels; the composite has {} x {}", size.0, size.1);
-            Err(Error::Truth { path: path.to_owned(), reason })
+            Err(Error::Input { path: path.to_owned(), reason })
         };
         let (mut true_color, mut true_depth) = (None, None);
         if let Some(path) = find("color.png") {
