@@ -2,10 +2,11 @@
 //!
 //! [`render`] renders a [`Stage`] (shapes that deform, bodies with poses, lights) through a
 //! [`RayGenerator`] (any camera model). One pass gives colour, metric depth, labels and normals,
-//! either with direct light only ([`RenderSettings::Preview`], rasterised; [`RenderSettings::Smooth`]
-//! smooths its edges; its reference [`RenderSettings::Traced`] casts a ray per pixel) or by path
-//! tracing ([`RenderSettings::Path`]). [`phong::PhongScene`] is a second, simpler renderer for phantoms and
-//! the figures of reports: one light, wireframes, double precision.
+//! either with direct light only or by path tracing ([`RenderSettings::Path`]). Direct light is
+//! rasterised ([`RenderSettings::Preview`], and [`RenderSettings::Smooth`] with smooth edges);
+//! [`RenderSettings::Traced`] casts a ray per pixel and is its reference. [`phong::PhongScene`] is a
+//! second, simpler renderer for phantoms and the figures of reports: one light, wireframes, double
+//! precision.
 //!
 //! The result does not depend on the number of threads.
 //!
