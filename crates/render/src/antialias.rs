@@ -1,5 +1,5 @@
 //! Anti-aliasing of previews: a pixel whose colour differs much from a neighbour's becomes the mean
-//! of four points. So the edges of bodies, shadows and highlights are smooth, for less than half the
+//! of four points. So the edges of bodies, shadows and highlights are smooth, in less than half the
 //! time of a picture of twice the size.
 
 use crate::deferred::{Buffers, Shading};
