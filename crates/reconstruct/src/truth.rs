@@ -47,7 +47,7 @@ pub struct TruthFigures {
 
 impl Truth {
     /// Reads `color.png` and `depth.png` in the folder `dir` of the truth, or in `truth/` of the
-    /// recording `dir`; `None` without either.
+    /// recording `dir`; `None` without either. All images of `r` must have one size.
     ///
     /// # Errors
     /// Names the file when it is unreadable or of another size than the composite.

@@ -14,6 +14,9 @@ use rayon::prelude::*;
 /// Points along each side of a pixel.
 pub(crate) const FINER: usize = 2;
 
+/// Greatest side of a picture that is refined (px): its points take 150 bytes each.
+pub(crate) const MAX_SIDE: usize = 4096;
+
 /// Difference from a neighbour, of 255 levels of a channel, above which a pixel is refined.
 const CONTRAST: u8 = 20;
 
@@ -95,7 +98,7 @@ pub(crate) fn antialias(
             for (u, color) in row.iter_mut().enumerate().filter(|(u, _)| marks.has(*u, first / FINER + v)) {
                 let at = FINER * (v * FINER * width + u);
                 let four = [at, at + 1, at + FINER * width, at + FINER * width + 1].map(|i| rows.color[i]);
-                *color = [0, 1, 2].map(|c| (four.iter().map(|p| u32::from(p[c])).sum::<u32>() / 4) as u8);
+                *color = [0, 1, 2].map(|c| ((four.iter().map(|p| u32::from(p[c])).sum::<u32>() + 2) / 4) as u8);
             }
         }
     });

@@ -7,7 +7,11 @@ use crate::film::Film;
 use crate::light::Light;
 use crate::picture::Picture;
 use crate::raster::{View, Visibility};
+use crate::rays::TILE;
+use crate::shading_frame::offset;
+use crate::stage::Stage;
 use glam::{Mat3A, Vec3A};
+use rayon::prelude::*;
 use trocar_camera::CameraModel;
 
 /// Number of cameras, each at one pose, of which a background is kept.
@@ -44,6 +48,8 @@ pub(crate) struct Background {
     look: Option<Look>,
     /// Light of the drawn bodies with that look.
     picture: Option<Picture>,
+    /// See [`Behind::boxes`].
+    boxes: Vec<Option<[Vec3A; 2]>>,
 }
 
 /// How a body has moved.
@@ -58,11 +64,14 @@ struct Rest {
     is_drawn: bool,
 }
 
-/// A picture of bodies at rest, which others may cover.
+/// A picture of bodies at rest, which others may cover and shade.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Behind<'a> {
     pub visibility: &'a Visibility,
     pub picture: &'a Picture,
+    /// For each tile a box around what it shows (m, in the world); `None` if that is nothing.
+    pub boxes: &'a [Option<[Vec3A; 2]>],
+    bodies: &'a [Rest],
 }
 
 /// Everything besides the bodies on which the light of a picture depends.
@@ -71,6 +80,20 @@ struct Look {
     lights: Vec<Light>,
     environment: [f32; 3],
     film: Film,
+    /// Whether bodies at rest cast shadows on each other.
+    shadows: bool,
+}
+
+impl<'a> Behind<'a> {
+    /// A picture without shadows.
+    pub fn unshaded(visibility: &'a Visibility, picture: &'a Picture) -> Self {
+        Self { visibility, picture, boxes: &[], bodies: &[] }
+    }
+
+    /// Whether a body is in the picture.
+    pub fn shows(&self, body: usize) -> bool {
+        self.bodies.get(body).is_some_and(|b| b.is_drawn)
+    }
 }
 
 impl Clone for Memory {
@@ -112,6 +135,7 @@ impl Background {
             points: None,
             look: None,
             picture: None,
+            boxes: Vec::new(),
         }
     }
 
@@ -153,10 +177,11 @@ impl Background {
         self.bodies.iter().all(|b| b.rests() || !b.is_drawn)
     }
 
-    /// Keeps the bodies at rest, drawn. Returns what was kept before, if it was lit.
-    pub fn keep(&mut self, drawn: Visibility) -> Option<(Visibility, Picture)> {
+    /// Keeps the bodies at rest, drawn through `view`. Returns what was kept before, if it was lit.
+    pub fn keep(&mut self, drawn: Visibility, view: &View<'_>) -> Option<(Visibility, Picture)> {
         self.bodies.iter_mut().for_each(|b| b.is_drawn = b.rests());
         let kept = self.bodies.iter().any(|b| b.is_drawn).then_some(drawn);
+        self.boxes = kept.as_ref().map(|drawn| boxes(drawn, view)).unwrap_or_default();
         self.points = None;
         std::mem::replace(&mut self.visibility, kept).zip(self.picture.take())
     }
@@ -184,10 +209,13 @@ impl Background {
     }
 
     /// Whether [`Self::keep_light`] is worth while: the picture before had this look too.
-    pub fn wants_light(&mut self, lights: &[Light], environment: [f32; 3], film: Film) -> bool {
-        let same = |l: &Look| l.lights == lights && l.environment == environment && l.film == film;
+    pub fn wants_light(&mut self, stage: &Stage, film: Film, shadows: bool) -> bool {
+        let same = |l: &Look| {
+            l.lights == stage.lights && l.environment == stage.environment && l.film == film && l.shadows == shadows
+        };
         if !self.look.as_ref().is_some_and(same) {
-            self.look = Some(Look { lights: lights.to_vec(), environment, film });
+            let (lights, environment) = (stage.lights.clone(), stage.environment);
+            self.look = Some(Look { lights, environment, film, shadows });
             self.picture = None;
             return false;
         }
@@ -201,8 +229,32 @@ impl Background {
 
     /// The bodies at rest and, if it is known, their light.
     pub fn lit(&self) -> Option<Behind<'_>> {
-        Some(Behind { visibility: self.visibility.as_ref()?, picture: self.picture.as_ref()? })
+        let (visibility, picture) = (self.visibility.as_ref()?, self.picture.as_ref()?);
+        Some(Behind { visibility, picture, boxes: &self.boxes, bodies: &self.bodies })
     }
+}
+
+/// For each tile a box around what it shows, and a little more: rays start above surfaces.
+fn boxes(drawn: &Visibility, view: &View<'_>) -> Vec<Option<[Vec3A; 2]>> {
+    let (width, height, stride) = (view.rays.width(), view.rays.height(), view.rays.stride());
+    let columns = width.div_ceil(TILE);
+    let of_tile = |tile: usize| {
+        let (top, left) = (tile / columns * TILE, tile % columns * TILE);
+        let mut ends: Option<[Vec3A; 2]> = None;
+        for v in top..height.min(top + TILE) {
+            for u in left..width.min(left + TILE) {
+                let t = drawn.depth[v * stride + u];
+                if t < f32::INFINITY {
+                    let p = view.origin + view.rotation * view.rays.through(u, v) * t;
+                    let margin = Vec3A::splat(2.0 * offset(p));
+                    let [low, high] = ends.unwrap_or([Vec3A::INFINITY, Vec3A::NEG_INFINITY]);
+                    ends = Some([low.min(p - margin), high.max(p + margin)]);
+                }
+            }
+        }
+        ends
+    };
+    (0..columns * height.div_ceil(TILE)).into_par_iter().map(of_tile).collect()
 }
 
 impl Rest {

@@ -22,7 +22,7 @@ pub(crate) struct Buffers {
     directions: Vec<Vec3A>,
     candidates: BundleCandidates,
     stacks: Stacks,
-    /// Which parts of [`LANES`] pixels of the rows are not as those behind.
+    /// Which parts of [`LANES`] pixels of the rows were shaded.
     pub shaded: Vec<bool>,
 }
 
@@ -52,6 +52,8 @@ pub(crate) struct Shading<'a> {
     pub shadows: bool,
     /// What the rows hold already.
     pub behind: Option<Behind<'a>>,
+    /// By body, which cast shadows.
+    pub casting: &'a (dyn Fn(usize) -> bool + Sync),
     /// The pixels to shade; `None` for all.
     pub marks: Option<&'a Marks>,
 }
@@ -80,7 +82,7 @@ pub(crate) fn may_cast(stage: &Stage, eye: Vec3A, least: f32) -> bool {
 impl<'a> Shading<'a> {
     /// Of all pixels, without shadows.
     pub fn new(stage: &'a Stage, view: &'a View<'a>) -> Self {
-        Self { stage, view, shadows: false, behind: None, marks: None }
+        Self { stage, view, shadows: false, behind: None, casting: &|_| true, marks: None }
     }
 
     /// Shades the rows of a picture from row `first`.
@@ -96,18 +98,19 @@ impl<'a> Shading<'a> {
         let parts = width.div_ceil(LANES);
         buffers.shaded.clear();
         buffers.shaded.resize(count * parts, false);
-        let mut body = (0, 0..0);
+        let (tiles, mut body) = (width.div_ceil(TILE), (0, 0..0));
         let mut top = 0;
         while top < count {
             let mut left = 0;
             while left < width {
+                let shaded_anew = self.shaded_anew((first + top) / TILE * tiles + left / TILE, buffers);
                 let mut row = top;
                 while row < count.min(top + TILE) {
                     let part =
                         Part { at: row * stride + left, ray: (first + row) * stride + left, to: row * width + left };
                     let within = (1 << LANES.min(width - left)) - 1;
                     let wanted = self.marks.map_or(within, |marks| marks.at(first + row, left) & within);
-                    let fresh = self.fresh(simd, part, wanted, seen);
+                    let fresh = if shaded_anew { wanted } else { self.fresh(simd, part, wanted, seen) };
                     if fresh != 0 {
                         buffers.shaded[row * parts + left / LANES] = true;
                         self.pixels(simd, fresh, part, seen, rows, &mut body, buffers);
@@ -121,6 +124,16 @@ impl<'a> Shading<'a> {
             }
             top += TILE;
         }
+    }
+
+    /// Whether shadows in a tile may differ from those behind: a body that is not in that picture
+    /// may lie between a lamp and what the tile shows of it.
+    fn shaded_anew(&self, tile: usize, buffers: &mut Buffers) -> bool {
+        let Some(behind) = self.behind.filter(|_| self.shadows) else { return false };
+        let Some(shown) = behind.boxes.get(tile).copied().flatten() else { return false };
+        let moves = |body: usize| !behind.shows(body);
+        let lamps = self.stage.lamps();
+        lamps.iter().any(|l| self.stage.may_come_between(l.centre(), shown, moves, &mut buffers.candidates))
     }
 
     /// Which of the `wanted` pixels of a part are not as those behind.
@@ -271,6 +284,7 @@ impl<'a> Shading<'a> {
             directions.clear();
             directions.extend(waiting.iter().map(|w| w.direction));
             self.stage.collect_bundle(centre, directions, candidates);
+            Stage::retain(candidates, self.casting);
             for Waiting { pixel, direction, light } in waiting.drain(..) {
                 if !self.stage.bundle_blocked(candidates, centre, direction, SHADOW_RAY_END, stacks) {
                     let sum = Vec3A::from(rows.light[pixel]) + light;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use trocar_camera::{ColorImage, DepthImage};
 
 /// A rendered picture, rows from the top. Depth, labels and normals are taken at pixel centres; so
-/// is light, but of paths.
+/// is light, except with path tracing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Colour after exposure and tone mapping by the film.

@@ -27,7 +27,7 @@ pub(crate) fn preview(
     let mut visibility = std::mem::take(&mut memory.visibility);
     let mut points = std::mem::take(&mut memory.points);
     let background = memory.background(view, stage.changes());
-    keep(background, stage, view, film);
+    let before = keep(background, stage, view);
     let drawn = |body| !background.rests(body);
     let drawing = Drawing { stage, view, drawn: &drawn, behind: background.visibility() };
     let casts = shadows && {
@@ -35,20 +35,20 @@ pub(crate) fn preview(
         // Rays are at least as long as their parameter says.
         may_cast(stage, view.origin, visibility.depth.iter().copied().fold(f32::INFINITY, f32::min))
     };
-    let bands = picture.bands(view.rays.width() * ROWS).zip(visibility.bands(view.rays, ROWS));
     if casts {
         stage.update_acceleration();
-        let shading = Shading { shadows, ..Shading::new(stage, view) };
-        bands.for_each_init(Buffers::new, |buffers, ((k, rows), seen)| shade(&shading, k, rows, &seen, film, buffers));
-    } else {
-        let shading = Shading { behind: background.lit(), ..Shading::new(stage, view) };
-        bands.for_each_init(Buffers::new, |buffers, ((k, rows), seen)| {
-            if !shadows {
-                drawing.draw(k * ROWS, seen.depth, seen.triangle);
-            }
-            shade(&shading, k, rows, &seen, film, buffers);
-        });
     }
+    light(background, before, stage, view, casts, film);
+    let drawn = |body| !background.rests(body);
+    let drawing = Drawing { stage, view, drawn: &drawn, behind: background.visibility() };
+    let shading = Shading { shadows: casts, behind: background.lit(), ..Shading::new(stage, view) };
+    let bands = picture.bands(view.rays.width() * ROWS).zip(visibility.bands(view.rays, ROWS));
+    bands.for_each_init(Buffers::new, |buffers, ((k, rows), seen)| {
+        if !shadows {
+            drawing.draw(k * ROWS, seen.depth, seen.triangle);
+        }
+        shade(&shading, k, rows, &seen, film, buffers);
+    });
     if smooth {
         let view = &View { rays: view.rays.finer(), ..*view };
         background.keep_points(|background| {
@@ -70,31 +70,47 @@ pub(crate) fn preview(
     stage.memory = memory;
 }
 
-/// Draws and lights the bodies at rest, if they differ from before. Bodies that have newly come to
-/// rest are drawn over the kept ones. Only pixels that show another triangle are lit.
-fn keep(background: &mut Background, stage: &Stage, view: &View<'_>, film: &Film) {
-    let mut before = None;
-    if background.is_stale() {
-        let behind = background.visibility().filter(|_| background.is_right());
-        let drawn = |body| background.rests(body) && !(behind.is_some() && background.shows(body));
-        let mut fresh = Visibility::default();
-        draw(&mut fresh, &Drawing { stage, view, drawn: &drawn, behind });
-        before = background.keep(fresh);
+/// Draws the bodies at rest, if they differ from before. Bodies that have newly come to rest are
+/// drawn over the kept ones. Returns what was kept before, if it was lit.
+fn keep(background: &mut Background, stage: &Stage, view: &View<'_>) -> Option<(Visibility, Picture)> {
+    if !background.is_stale() {
+        return None;
     }
+    let behind = background.visibility().filter(|_| background.is_right());
+    let drawn = |body| background.rests(body) && !(behind.is_some() && background.shows(body));
+    let mut fresh = Visibility::default();
+    draw(&mut fresh, &Drawing { stage, view, drawn: &drawn, behind });
+    background.keep(fresh, view)
+}
+
+/// Lights the bodies at rest, if that is worth while, with the shadows that they cast on each other.
+/// Without shadows only pixels that show another triangle than `before` are lit.
+fn light(
+    background: &mut Background,
+    before: Option<(Visibility, Picture)>,
+    stage: &Stage,
+    view: &View<'_>,
+    casts: bool,
+    film: &Film,
+) {
     // Noise differs from picture to picture.
     let clean = Film { noise: None, ..*film };
-    if background.wants_light(&stage.lights, stage.environment, clean) {
-        let mut lit = Picture::new(view.rays.width(), view.rays.height());
-        let behind = before.as_ref().map(|(visibility, picture)| Behind { visibility, picture });
-        let shading = Shading { behind, ..Shading::new(stage, view) };
-        if let Some(visibility) = background.visibility_mut() {
-            let bands = lit.bands(view.rays.width() * ROWS).zip(visibility.bands(view.rays, ROWS));
-            bands.for_each_init(Buffers::new, |buffers, ((k, rows), seen)| {
-                shade(&shading, k, rows, &seen, &clean, buffers);
-            });
-        }
-        background.keep_light(lit);
+    if !background.wants_light(stage, clean, casts) {
+        return;
     }
+    let mut lit = Picture::new(view.rays.width(), view.rays.height());
+    let before = before.filter(|_| !casts);
+    let behind = before.as_ref().map(|(visibility, picture)| Behind::unshaded(visibility, picture));
+    let drawn: Vec<bool> = stage.changes().enumerate().map(|(body, _)| background.shows(body)).collect();
+    let casting = |body: usize| drawn[body];
+    if let Some(visibility) = background.visibility_mut() {
+        let shading = Shading { shadows: casts, behind, casting: &casting, ..Shading::new(stage, view) };
+        let bands = lit.bands(view.rays.width() * ROWS).zip(visibility.bands(view.rays, ROWS));
+        bands.for_each_init(Buffers::new, |buffers, ((k, rows), seen)| {
+            shade(&shading, k, rows, &seen, &clean, buffers);
+        });
+    }
+    background.keep_light(lit);
 }
 
 fn draw(visibility: &mut Visibility, drawing: &Drawing<'_>) {

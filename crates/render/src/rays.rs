@@ -116,11 +116,16 @@ impl RayGenerator {
 
     /// The rays of the points of all pixels, [`FINER`] along each side.
     pub(crate) fn finer(&self) -> &Self {
-        self.finer.get_or_init(|| {
-            let fine = Self::new(self.model.finer(FINER));
-            let diameter = self.circle.map(|radius| 2.0 * radius / self.height as f32);
-            Box::new(diameter.map_or(fine.clone(), |diameter| fine.with_circular_image(diameter)))
-        })
+        if let Some(fine) = self.finer.get() {
+            return fine;
+        }
+        // Not within the lock: a thread that waits for others may take work that needs these rays.
+        let fine = Self::new(self.model.finer(FINER));
+        let fine = match self.circle {
+            Some(radius) => fine.with_circular_image(2.0 * radius / self.height as f32),
+            None => fine,
+        };
+        self.finer.get_or_init(|| Box::new(fine))
     }
 
     /// The lens that determines the rays: the camera model, and the radius of the circular image
@@ -174,7 +179,7 @@ impl RayGenerator {
         let corners = self.corners.get_or_init(|| {
             let (columns, rows) = (self.width + 1, self.height + 1);
             let corner = |i: usize| ray(&self.model, (i % columns) as f64 - 0.5, (i / columns) as f64 - 0.5);
-            (0..columns * rows).into_par_iter().map(corner).collect()
+            (0..columns * rows).map(corner).collect()
         });
         let at = pixel / self.width * (self.width + 1) + pixel % self.width;
         let corner = |i: usize| Vec3A::from(corners[i]);

@@ -1,5 +1,6 @@
 //! Rendering a stage: rasterised, with a ray per pixel, or with many paths per pixel.
 
+use crate::antialias::MAX_SIDE;
 use crate::bvh::Stacks;
 use crate::denoise::{Guide, denoise};
 use crate::direct::{self, ShadowBuffers, VisiblePoint};
@@ -29,8 +30,8 @@ pub enum RenderSettings {
         shadows: bool,
     },
     /// [`Preview`](Self::Preview) with shadows and smooth edges: for films and reports. A pixel
-    /// that differs from a neighbour has the mean colour of four points. Noise of the film would
-    /// hide that; a picture with noise is a preview.
+    /// that differs from a neighbour has the mean colour of four points. A picture with noise of the
+    /// film, or of more than 4096 pixels a side, is a preview.
     Smooth,
     /// The same light on what a ray per pixel hits: the reference for `Preview`.
     Traced {
@@ -94,7 +95,7 @@ pub fn render_into(
     let view = View { rays, rotation: rotation_of(pose), origin: pose.translation.as_vec3a() };
     let rasterised = match *settings {
         RenderSettings::Preview { shadows } => Some((shadows, false)),
-        RenderSettings::Smooth => Some((true, film.noise.is_none())),
+        RenderSettings::Smooth => Some((true, film.noise.is_none() && rays.width().max(rays.height()) <= MAX_SIDE)),
         RenderSettings::Traced { .. } | RenderSettings::Path { .. } => None,
     };
     if let Some(kind) = rasterised {

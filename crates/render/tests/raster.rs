@@ -257,6 +257,16 @@ fn raster_does_not_depend_on_thread_count() {
 /// copy, which keeps nothing.
 #[test]
 fn pictures_do_not_depend_on_earlier_ones() {
+    earlier_pictures(false);
+}
+
+/// The same with a lamp that casts shadows, which bodies at rest keep and others change.
+#[test]
+fn shadows_do_not_depend_on_earlier_pictures() {
+    earlier_pictures(true);
+}
+
+fn earlier_pictures(shadows: bool) {
     let mut stage = stage();
     let rest = sphere(DVec3::new(0.0, 0.0, 0.15), 0.03, 30);
     let (soft, _) = stage.add_mesh(&rest, 95, &Appearance::tissue([200, 80, 70])).unwrap();
@@ -292,12 +302,16 @@ fn pictures_do_not_depend_on_earlier_ones() {
             stage.place(patch, &Pose { translation: lift, ..Pose::IDENTITY }).unwrap();
         }
         stage.lights = vec![Light::endoscope(&eyes[0].1, 0.0025, if frame < 70 { 0.12 } else { 0.15 })];
+        if shadows {
+            let corner = DVec3::new(-0.5, 0.1, -0.9);
+            stage.lights.push(Light::Panel { corner, along: DVec3::X, across: DVec3::Y, radiance: [6.0; 3] });
+        }
         let noise = (frame % 7 == 3).then_some(Noise { shot: 0.015, read: 0.003, seed: 1, frame });
         let film = Film { noise, ..Film::endoscope() };
         let (rays, pose) = &eyes[if frame % 10 == 9 { 1 + usize::from(frame % 20 == 9) } else { 0 }];
         let settings = match frame % 9 {
             2 | 7 => RenderSettings::Smooth,
-            kind => RenderSettings::Preview { shadows: kind == 4 },
+            kind => RenderSettings::Preview { shadows: shadows || kind == 4 },
         };
         render_into(&mut quick, &mut stage, rays, pose, &settings, &film);
         assert!(quick == render(&mut stage.clone(), rays, pose, &settings, &film), "frame {frame}");

@@ -6,7 +6,7 @@
 //! decides.
 
 use super::scene::View;
-use super::trace::{Hit, Tracer, intersect};
+use super::trace::{Hit, Tracer, edges, intersect};
 use glam::{DVec2, DVec3};
 use trocar_camera::Camera;
 
@@ -102,10 +102,10 @@ impl Drawing {
         let (columns, rows) = (camera.width * finer, camera.height * finer);
         let (to_camera, bands) = (view.pose.inverse(), rows.div_ceil(BAND));
         let size = DVec2::new(columns as f64, rows as f64);
-        let covered = tracer.corners().iter().map(|[a, ab, ac]| {
-            let corners = [*a, *a + *ab, *a + *ac].map(|p| to_camera.transform(p));
-            covered(camera, corners, finer as f64, size)
-        });
+        let covered = tracer
+            .triangles()
+            .iter()
+            .map(|corners| covered(camera, corners.map(|p| to_camera.transform(p)), finer as f64, size));
         let covered: Vec<Covered> = covered.collect();
         let bands_of = |c: &Covered| c.rows[0] as usize / BAND..(c.rows[1] as usize / BAND + 1).min(bands);
         let mut first = vec![0; bands + 1];
@@ -141,7 +141,7 @@ impl Drawing {
     /// Draws what of the triangles is in a row of samples.
     fn draw(&self, tracer: &Tracer, origin: DVec3, row: usize, out: &mut Row) {
         for (triangle, Covered { columns, .. }) in self.of_row(row) {
-            let corners = &tracer.corners()[triangle as usize];
+            let corners = &edges(tracer.triangles()[triangle as usize]);
             for column in columns[0] as usize..=columns[1] as usize {
                 let Some((t, u, v)) = intersect(corners, origin, out.directions[column]) else { continue };
                 let nearest = out.hits[column].map_or(f64::INFINITY, |hit| hit.t);

@@ -17,9 +17,9 @@ const EDGE_TOLERANCE: f64 = 1e-9;
 /// The tree's builder has absolute tolerances, so the scene is shifted and scaled into the unit
 /// cube for it.
 pub(crate) struct Tracer {
-    /// Triangles as they were given: first corner and the two edges from it (m).
-    corners: Vec<[DVec3; 3]>,
-    /// Built for the first ray: what is drawn needs none.
+    /// Corners of the triangles (m).
+    triangles: Vec<[DVec3; 3]>,
+    /// Built for the first ray. What is drawn needs it only where triangles are equally near.
     tree: OnceLock<Tree>,
     centre: DVec3,
     /// Half the largest extent (m).
@@ -28,7 +28,7 @@ pub(crate) struct Tracer {
 
 struct Tree {
     bvh: CwBvh,
-    /// Triangles in the order of the tree, as in [`Tracer::corners`].
+    /// Triangles in the order of the tree: first corner and the two edges from it (m).
     corners: Vec<[DVec3; 3]>,
 }
 
@@ -64,25 +64,24 @@ impl Tracer {
         }
         let centre = (low + high) / 2.0;
         let radius = ((high - low).max_element() / 2.0).max(1e-9);
-        let corners = triangles.iter().map(|[a, b, c]| [*a, *b - *a, *c - *a]).collect();
-        Self { corners, tree: OnceLock::new(), centre, radius }
+        Self { triangles: triangles.to_vec(), tree: OnceLock::new(), centre, radius }
     }
 
-    /// The triangles: first corner and the two edges from it (m).
-    pub fn corners(&self) -> &[[DVec3; 3]] {
-        &self.corners
+    /// Corners of the triangles (m).
+    pub fn triangles(&self) -> &[[DVec3; 3]] {
+        &self.triangles
     }
 
     fn tree(&self) -> &Tree {
         self.tree.get_or_init(|| {
             let scaled = |p: DVec3| ((p - self.centre) / self.radius).as_vec3a();
-            let bounds = self.corners.iter().map(|[a, ab, ac]| {
-                let [a, b, c] = [*a, *a + *ab, *a + *ac].map(scaled);
+            let bounds = self.triangles.iter().map(|corners| {
+                let [a, b, c] = corners.map(scaled);
                 Bounds(Aabb { min: a.min(b).min(c) - BOX_MARGIN, max: a.max(b).max(c) + BOX_MARGIN })
             });
             let bounds: Vec<Bounds> = bounds.collect();
             let bvh = build_cwbvh(&bounds, BvhBuildParams::fast_build(), &mut std::time::Duration::default());
-            let corners = bvh.primitive_indices.iter().map(|&i| self.corners[i as usize]).collect();
+            let corners = bvh.primitive_indices.iter().map(|&i| edges(self.triangles[i as usize])).collect();
             Tree { bvh, corners }
         })
     }
@@ -118,7 +117,7 @@ impl Tracer {
     /// sphere, so that single precision suffices from any distance. Also returns the `t` of that
     /// entry and the tree length per unit of `t`.
     fn tree_ray(&self, origin: DVec3, direction: DVec3, reach: f64) -> Option<(Ray, f64, f64)> {
-        if self.corners.is_empty() {
+        if self.triangles.is_empty() {
             return None;
         }
         let to_centre = (self.centre - origin) / self.radius;
@@ -142,6 +141,11 @@ impl Tracer {
         let ray = Ray::new((d * start - to_centre).as_vec3a(), d.as_vec3a(), 0.0, (tmax * 1.00001) as f32);
         Some((ray, start / unit, unit))
     }
+}
+
+/// First corner of a triangle and the two edges from it.
+pub(super) fn edges([a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
+    [a, b - a, c - a]
 }
 
 /// Two-sided intersection in double precision (Moeller and Trumbore 1997).

@@ -70,6 +70,24 @@ impl Stage {
         parts.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     }
 
+    /// Leaves out the candidates whose body does not `count`.
+    pub(crate) fn retain(candidates: &mut BundleCandidates, counts: impl Fn(usize) -> bool) {
+        candidates.parts.retain(|(_, body, _)| counts(*body as usize));
+    }
+
+    /// Whether a body that `counts` may lie on the way from `origin` to a point of a box.
+    pub(crate) fn may_come_between(
+        &self,
+        origin: Vec3A,
+        [low, high]: [Vec3A; 2],
+        counts: impl Fn(usize) -> bool,
+        candidates: &mut BundleCandidates,
+    ) -> bool {
+        let leaves = &mut candidates.leaves;
+        self.top.beam(&Beam::new(origin, [low - origin, high - origin].into_iter()), leaves);
+        leaves.iter().any(|(near, leaf)| *near <= 1.0 && counts(self.entries[*leaf as usize].0 as usize))
+    }
+
     /// First surface along one ray of a bundle for which [`Self::collect_bundle`] was called.
     pub(crate) fn first_of_bundle(
         &self,
