@@ -3,6 +3,7 @@
 //! The cameras of a cell do not move, and most of what they see does not move either. Bodies that
 //! have rested for a while are drawn and lit once for a camera. Later pictures start with them.
 
+use crate::antialias::{KeptPoints, Refined};
 use crate::film::Film;
 use crate::light::Light;
 use crate::picture::Picture;
@@ -42,8 +43,11 @@ pub(crate) struct Background {
     bodies: Vec<Rest>,
     /// Bodies that are drawn.
     visibility: Option<Visibility>,
-    /// The same at the points of the pixels, if a picture with smooth edges has asked for it.
-    points: Option<Visibility>,
+    /// The same at the points of the pixels, if a picture with smooth edges has asked for it, and
+    /// boxes around what their tiles show.
+    points: Option<(Visibility, Vec<Option<[Vec3A; 2]>>)>,
+    /// The refined pixels of `picture`.
+    refined: Option<Refined>,
     /// The light of the last picture.
     look: Option<Look>,
     /// Light of the drawn bodies with that look.
@@ -133,6 +137,7 @@ impl Background {
             bodies: changes.map(|change| Rest { change, pictures: REST - 1, needed: REST, is_drawn: false }).collect(),
             visibility: None,
             points: None,
+            refined: None,
             look: None,
             picture: None,
             boxes: Vec::new(),
@@ -182,7 +187,7 @@ impl Background {
         self.bodies.iter_mut().for_each(|b| b.is_drawn = b.rests());
         let kept = self.bodies.iter().any(|b| b.is_drawn).then_some(drawn);
         self.boxes = kept.as_ref().map(|drawn| boxes(drawn, view)).unwrap_or_default();
-        self.points = None;
+        (self.points, self.refined) = (None, None);
         std::mem::replace(&mut self.visibility, kept).zip(self.picture.take())
     }
 
@@ -191,16 +196,33 @@ impl Background {
         self.visibility.as_ref()
     }
 
-    /// Keeps what `draw` draws of the bodies at the points of the pixels, if they have no points yet.
-    pub fn keep_points(&mut self, draw: impl FnOnce(&Self) -> Visibility) {
+    /// Keeps what `draw` draws of the bodies at the points of the pixels, which `view` sees, if they
+    /// have no points yet.
+    pub fn keep_points(&mut self, view: &View<'_>, draw: impl FnOnce(&Self) -> Visibility) {
         if self.visibility.is_some() && self.points.is_none() {
-            self.points = Some(draw(self));
+            let points = draw(self);
+            let boxes = boxes(&points, view);
+            self.points = Some((points, boxes));
         }
     }
 
     /// The bodies at rest at the points of the pixels.
     pub fn points(&self) -> Option<&Visibility> {
-        self.points.as_ref()
+        self.points.as_ref().map(|(points, _)| points)
+    }
+
+    /// Keeps the refined pixels that `refine` makes of the light of the drawn bodies, if that is
+    /// known and they are not.
+    pub fn keep_refined(&mut self, refine: impl FnOnce(&Self, Picture) -> Refined) {
+        if let (Some(picture), Some(_), None) = (&self.picture, &self.points, &self.refined) {
+            self.refined = Some(refine(self, picture.clone()));
+        }
+    }
+
+    /// The points of the pixels with their refined pixels; `moves` says which bodies are not drawn.
+    pub fn kept_points<'a>(&'a self, moves: &'a (dyn Fn(usize) -> bool + Sync)) -> Option<KeptPoints<'a>> {
+        let ((points, boxes), refined) = (self.points.as_ref()?, self.refined.as_ref()?);
+        Some(KeptPoints { refined, points, boxes, moves })
     }
 
     /// The bodies at rest, to be lit.
@@ -216,7 +238,7 @@ impl Background {
         if !self.look.as_ref().is_some_and(same) {
             let (lights, environment) = (stage.lights.clone(), stage.environment);
             self.look = Some(Look { lights, environment, film, shadows });
-            self.picture = None;
+            (self.picture, self.refined) = (None, None);
             return false;
         }
         self.visibility.is_some() && self.picture.is_none()
@@ -224,7 +246,7 @@ impl Background {
 
     /// Keeps a picture of the bodies at rest in the last look.
     pub fn keep_light(&mut self, picture: Picture) {
-        self.picture = Some(picture);
+        (self.picture, self.refined) = (Some(picture), None);
     }
 
     /// The bodies at rest and, if it is known, their light.

@@ -46,6 +46,7 @@ struct Part {
 }
 
 /// A picture that is being shaded.
+#[derive(Clone, Copy)]
 pub(crate) struct Shading<'a> {
     pub stage: &'a Stage,
     pub view: &'a View<'a>,
@@ -67,6 +68,10 @@ impl Buffers {
             stacks: Stacks::new(),
             shaded: Vec::new(),
         }
+    }
+
+    pub fn candidates(&mut self) -> &mut BundleCandidates {
+        &mut self.candidates
     }
 }
 
@@ -126,14 +131,11 @@ impl<'a> Shading<'a> {
         }
     }
 
-    /// Whether shadows in a tile may differ from those behind: a body that is not in that picture
-    /// may lie between a lamp and what the tile shows of it.
+    /// Whether shadows in a tile may differ from those behind.
     fn shaded_anew(&self, tile: usize, buffers: &mut Buffers) -> bool {
         let Some(behind) = self.behind.filter(|_| self.shadows) else { return false };
-        let Some(shown) = behind.boxes.get(tile).copied().flatten() else { return false };
-        let moves = |body: usize| !behind.shows(body);
-        let lamps = self.stage.lamps();
-        lamps.iter().any(|l| self.stage.may_come_between(l.centre(), shown, moves, &mut buffers.candidates))
+        let shown = behind.boxes.get(tile).copied().flatten();
+        self.stage.shaded_anew(shown, |body| !behind.shows(body), &mut buffers.candidates)
     }
 
     /// Which of the `wanted` pixels of a part are not as those behind.

@@ -1,6 +1,6 @@
 //! Previews: rasterised, with direct light.
 
-use crate::antialias::antialias;
+use crate::antialias::{Marks, Refined, antialias};
 use crate::background::{Background, Behind};
 use crate::deferred::{Buffers, Shading, may_cast};
 use crate::film::Film;
@@ -50,20 +50,7 @@ pub(crate) fn preview(
         shade(&shading, k, rows, &seen, film, buffers);
     });
     if smooth {
-        let view = &View { rays: view.rays.finer(), ..*view };
-        background.keep_points(|background| {
-            let mut at_rest = Visibility::default();
-            draw(&mut at_rest, &Drawing { stage, view, drawn: &|body| background.shows(body), behind: None });
-            at_rest
-        });
-        let drawn = |body| !background.shows(body);
-        antialias(
-            picture,
-            &Drawing { stage, view, drawn: &drawn, behind: background.points() },
-            casts,
-            film,
-            &mut points,
-        );
+        smooth_edges(picture, background, stage, view, casts, film, &mut points);
     }
     memory.points = points;
     memory.visibility = visibility;
@@ -111,6 +98,36 @@ fn light(
         });
     }
     background.keep_light(lit);
+}
+
+/// Refines the picture. Edges of bodies at rest are kept.
+fn smooth_edges(
+    picture: &mut Picture,
+    background: &mut Background,
+    stage: &Stage,
+    view: &View<'_>,
+    casts: bool,
+    film: &Film,
+    points: &mut Visibility,
+) {
+    let view = &View { rays: view.rays.finer(), ..*view };
+    background.keep_points(view, |background| {
+        let mut at_rest = Visibility::default();
+        draw(&mut at_rest, &Drawing { stage, view, drawn: &|body| background.shows(body), behind: None });
+        at_rest
+    });
+    background.keep_refined(|background, mut lit| {
+        let marks = Marks::of(&lit);
+        let casting = |body| background.shows(body);
+        let drawing = Drawing { stage, view, drawn: &|_| false, behind: background.points() };
+        antialias((&mut lit, &marks), &drawing, casts.then_some(&casting), film, points, None);
+        Refined::new(marks, lit.color.pixels)
+    });
+    let moves = |body| !background.shows(body);
+    let drawing = Drawing { stage, view, drawn: &moves, behind: background.points() };
+    let kept = background.kept_points(&moves);
+    let marks = Marks::of(picture);
+    antialias((picture, &marks), &drawing, casts.then_some(&|_| true), film, points, kept);
 }
 
 fn draw(visibility: &mut Visibility, drawing: &Drawing<'_>) {

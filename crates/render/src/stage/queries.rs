@@ -75,17 +75,21 @@ impl Stage {
         candidates.parts.retain(|(_, body, _)| counts(*body as usize));
     }
 
-    /// Whether a body that `counts` may lie on the way from `origin` to a point of a box.
-    pub(crate) fn may_come_between(
+    /// Whether the shadows in a box may have changed: a body that `moves` may lie between a lamp
+    /// and the box.
+    pub(crate) fn shaded_anew(
         &self,
-        origin: Vec3A,
-        [low, high]: [Vec3A; 2],
-        counts: impl Fn(usize) -> bool,
+        shown: Option<[Vec3A; 2]>,
+        moves: impl Fn(usize) -> bool,
         candidates: &mut BundleCandidates,
     ) -> bool {
+        let Some([low, high]) = shown else { return false };
         let leaves = &mut candidates.leaves;
-        self.top.beam(&Beam::new(origin, [low - origin, high - origin].into_iter()), leaves);
-        leaves.iter().any(|(near, leaf)| *near <= 1.0 && counts(self.entries[*leaf as usize].0 as usize))
+        self.lamps().iter().any(|lamp| {
+            let origin = lamp.centre();
+            self.top.beam(&Beam::new(origin, [low - origin, high - origin].into_iter()), leaves);
+            leaves.iter().any(|(near, leaf)| *near <= 1.0 && moves(self.entries[*leaf as usize].0 as usize))
+        })
     }
 
     /// First surface along one ray of a bundle for which [`Self::collect_bundle`] was called.
