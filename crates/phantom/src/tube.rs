@@ -1,6 +1,6 @@
 //! A curved, tapered, elliptical tube with rounded ends, defined by a signed distance.
 
-use crate::noise;
+use crate::noise::{self, SmoothLine};
 use glam::DVec3;
 use trocar_geometry::SignedDistance;
 
@@ -46,7 +46,14 @@ pub(crate) struct Tube {
     reach: f64,
     /// Steps of the search for the nearest point of the centreline.
     rounds: usize,
+    /// Unevenness of the wall along the centreline, and displacement of its constrictions.
+    uneven: SmoothLine,
+    displaced: SmoothLine,
 }
+
+/// Width of the features of [`Tube::uneven`] and [`Tube::displaced`] (m).
+const UNEVEN: f64 = 0.012;
+const DISPLACED: f64 = 0.02;
 
 /// A point in local coordinates of an organ.
 pub(crate) struct LocalPoint {
@@ -93,7 +100,9 @@ impl Tube {
         let max_radius = shape.max_radius();
         let reach = line.iter().map(|p| (p - centre).length()).fold(0.0, f64::max) + max_radius;
         // Each step leaves the product of curvature and radius of the error: 0.7 in a tight turn.
-        Self { shape, seed, line, tangents, centre, reach, rounds: 16 }
+        let along = |seed, width| SmoothLine::new(seed, -0.1 * shape.length / width, 1.1 * shape.length / width);
+        let (uneven, displaced) = (along(seed, UNEVEN), along(seed + 1, DISPLACED));
+        Self { shape, seed, line, tangents, centre, reach, rounds: 16, uneven, displaced }
     }
 
     /// Point of the centreline at the base (s = 0).
@@ -198,9 +207,9 @@ impl Tube {
     /// Semi-axes at organ coordinate s.
     fn radii(&self, s: f64) -> (f64, f64) {
         let Shape { length, across, high, taper, bulge, folds: (depth, distance), .. } = self.shape;
-        let uneven = 0.05 * noise::smooth(self.seed, DVec3::new(s * length / 0.012, 0.5, 0.5));
+        let uneven = 0.05 * self.uneven.at(s * length / UNEVEN);
         // The cosine to a high power makes constrictions narrow and the parts between them wide.
-        let phase = s * length / distance + 0.6 * noise::smooth(self.seed + 1, DVec3::new(s * length / 0.02, 0.5, 0.5));
+        let phase = s * length / distance + 0.6 * self.displaced.at(s * length / DISPLACED);
         let fold = libm::cos(std::f64::consts::PI * phase).powi(6);
         let r = (1.0 + (taper - 1.0) * s)
             * (1.0 + bulge * libm::sin(std::f64::consts::PI * s) + uneven)
