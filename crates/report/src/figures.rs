@@ -36,7 +36,7 @@ pub fn img(picture: &ColorImage, alt: &str) -> Result<String> {
 }
 
 /// The picture as PNG, if that is no larger than 40 kB or one and a half times its JPEG of `jpeg`
-/// bytes.
+/// bytes. A photograph is not tried: its PNG is several times as large.
 fn small_png(rgb: &RgbImage, jpeg: usize) -> Result<Option<Vec<u8>>> {
     let encode = |compression| -> Result<Vec<u8>> {
         let mut png = Vec::new();
@@ -46,10 +46,25 @@ fn small_png(rgb: &RgbImage, jpeg: usize) -> Result<Option<Vec<u8>>> {
     };
     let is_small = |png: &Vec<u8>, times: usize| png.len() < 40_000 * times || 2 * png.len() <= 3 * jpeg * times;
     // Good compression takes most of the time. It hardly halves what the lightest one leaves.
-    if !is_small(&encode(CompressionType::Level(1))?, 2) {
+    if is_photograph(rgb) || !is_small(&encode(CompressionType::Level(1))?, 2) {
         return Ok(None);
     }
     Ok(Some(encode(CompressionType::Default)?).filter(|png| is_small(png, 1)))
+}
+
+/// Whether most of the pixels of a large picture have colours of their own.
+fn is_photograph(rgb: &RgbImage) -> bool {
+    const SAMPLES: usize = 8192;
+    let pixels = rgb.as_raw().as_chunks::<3>().0;
+    let every = pixels.len() / SAMPLES;
+    if every < 10 {
+        return false;
+    }
+    let mut colors: Vec<[u8; 3]> = pixels.iter().step_by(every).copied().collect();
+    let sampled = colors.len();
+    colors.sort_unstable();
+    colors.dedup();
+    2 * colors.len() > sampled
 }
 
 /// A picture above its caption (HTML), as a `<figure>`; `alt` is plain text.
@@ -106,6 +121,11 @@ mod tests {
         let html = img(&picture, "").unwrap();
         assert!(html.contains("image/jpeg"));
         assert_eq!(decoded(&html).width(), 300);
+        let large = |colors: usize| {
+            let pixels = (0..400 * 300).map(|i| picture.pixels[i % colors]).collect();
+            RgbImage::from_raw(400, 300, ColorImage { width: 400, height: 300, pixels }.pixels.concat()).unwrap()
+        };
+        assert!(is_photograph(&large(50_000)) && !is_photograph(&large(1000)));
     }
 
     #[test]
