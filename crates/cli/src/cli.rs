@@ -131,7 +131,7 @@ pub struct Demo {
     #[arg(short, long, default_value = "trocar-demo")]
     pub output: PathBuf,
     /// Frames of the recording, at 30 Hz.
-    #[arg(long, default_value_t = 61)]
+    #[arg(long, default_value_t = 46)]
     pub frames: usize,
     /// Seed of the anatomy and of the camera's noise.
     #[arg(long, default_value_t = 1)]

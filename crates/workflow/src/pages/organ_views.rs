@@ -8,7 +8,7 @@ use trocar_report::views::shell;
 use trocar_specimen::Specimen;
 
 /// Rays of ambient occlusion at a vertex, and how far they look (m).
-const OCCLUSION_RAYS: usize = 16;
+const OCCLUSION_RAYS: usize = 24;
 const OCCLUSION_REACH: f64 = 0.012;
 
 /// Directions for views of a specimen.
