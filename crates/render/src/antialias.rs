@@ -18,7 +18,7 @@ use std::ops::Range;
 /// Points along each side of a pixel.
 pub(crate) const FINER: usize = 2;
 
-/// Greatest side of a picture that is refined (px): its points take 150 bytes each.
+/// Greatest side of a picture that is refined (px): the points of a pixel take 150 bytes.
 pub(crate) const MAX_SIDE: usize = 4096;
 
 /// Difference from a neighbour, of 255 levels of a channel, above which a pixel is refined.
