@@ -196,8 +196,8 @@ impl Background {
         self.visibility.as_ref()
     }
 
-    /// Keeps what `draw` draws of the bodies at the points of the pixels, which `view` sees, if they
-    /// have no points yet.
+    /// Keeps what `draw` draws of the bodies at the points of the pixels, which `view` sees, if
+    /// they have no points yet.
     pub fn keep_points(&mut self, view: &View<'_>, draw: impl FnOnce(&Self) -> Visibility) {
         if self.visibility.is_some() && self.points.is_none() {
             let points = draw(self);

@@ -4,9 +4,9 @@
 //! [`RayGenerator`] (any camera model). One pass gives colour, metric depth, labels and normals,
 //! either with direct light only or by path tracing ([`RenderSettings::Path`]). Direct light is
 //! rasterised ([`RenderSettings::Preview`], and [`RenderSettings::Smooth`] with smooth edges);
-//! [`RenderSettings::Traced`] casts a ray per pixel and is its reference. [`phong::PhongScene`] is a
-//! second, simpler renderer for phantoms and the figures of reports: one light, wireframes, double
-//! precision.
+//! [`RenderSettings::Traced`] casts a ray per pixel and is its reference. [`phong::PhongScene`] is
+//! a second, simpler renderer for phantoms and the figures of reports: one light, wireframes,
+//! double precision.
 //!
 //! The result does not depend on the number of threads.
 //!

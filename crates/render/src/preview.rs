@@ -70,8 +70,8 @@ fn keep(background: &mut Background, stage: &Stage, view: &View<'_>) -> Option<(
     background.keep(fresh, view)
 }
 
-/// Lights the bodies at rest, if that is worth while, with the shadows that they cast on each other.
-/// Without shadows only pixels that show another triangle than `before` are lit.
+/// Lights the bodies at rest, if that is worth while, with the shadows that they cast on each
+/// other. Without shadows only pixels that show another triangle than `before` are lit.
 fn light(
     background: &mut Background,
     before: Option<(Visibility, Picture)>,

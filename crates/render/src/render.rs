@@ -30,8 +30,8 @@ pub enum RenderSettings {
         shadows: bool,
     },
     /// [`Preview`](Self::Preview) with shadows and smooth edges: for films and reports. A pixel
-    /// that differs from a neighbour has the mean colour of four points. A picture with noise of the
-    /// film, or of more than 4096 pixels a side, is a preview.
+    /// that differs from a neighbour has the mean colour of four points. A picture with noise of
+    /// the film, or of more than 4096 pixels a side, is a preview.
     Smooth,
     /// The same light on what a ray per pixel hits: the reference for `Preview`.
     Traced {
