@@ -5,6 +5,7 @@ use super::machine::Machine;
 use super::timing::Timing;
 use crate::names::Units;
 use crate::scenes::{BenchScene, FRAME, Organ, Organs, Run, ellipsoid, material};
+use crate::statistics::median;
 use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
@@ -66,6 +67,10 @@ pub struct LiftBench {
     /// Worker threads; all by default. Each organ is also lifted on one thread.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
+    /// Rounds of lifts and drags. The time of a frame is its median over the rounds, since the same
+    /// frame is the same work.
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=99))]
+    pub rounds: u32,
 }
 
 /// Times of a phase.
@@ -166,7 +171,7 @@ impl Study for LiftBench {
                 if !folder.is_dir() {
                     reconstruct_surface(path, *unit, &Default::default(), &folder, job.progress)?;
                 }
-                row(name, &Specimen::read(&folder)?, &folder, threads, job.progress)
+                row(name, &Specimen::read(&folder)?, &folder, (threads, self.rounds), job.progress)
             })
             .collect::<Result<Vec<_>>>()?;
         let result = LiftResult { rows, threads, skipped, machine };
@@ -196,10 +201,14 @@ impl LiftBench {
     }
 }
 
-/// Lifts the organ of `specimen` on `threads` threads and on one, and drags.
-fn row(name: &str, specimen: &Specimen, folder: &Path, threads: usize, progress: &dyn Progress) -> Result<LiftRow> {
-    let (frames, held) = lift(specimen, folder, threads, progress)?;
-    let one = if threads == 1 { None } else { Some(lift(specimen, folder, 1, progress)?.0) };
+/// Lifts the organ of `specimen` on `threads` threads and on one, and drags, in turns.
+fn row(
+    name: &str,
+    specimen: &Specimen,
+    folder: &Path,
+    (threads, rounds): (usize, u32),
+    progress: &dyn Progress,
+) -> Result<LiftRow> {
     let Some(organ) = specimen.organs.first() else {
         return Err(Error::Mismatch(format!("{name}: has no organ")));
     };
@@ -209,10 +218,23 @@ fn row(name: &str, specimen: &Specimen, folder: &Path, threads: usize, progress:
         source: name.to_owned(),
     };
     let elements = organ.body.tets.len();
-    let own_drag = drag(&alone, threads, progress)?;
-    let six_drag = drag(&Organs::analytic(elements)?, threads, progress)?;
+    let six = Organs::analytic(elements)?;
+    let (mut lifts, mut alone_lifts, mut own_drags, mut six_drags) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut held = false;
+    for _ in 0..rounds {
+        let (frames, holds) = lift(specimen, folder, threads, progress)?;
+        held = holds;
+        lifts.push(frames);
+        six_drags.push(drag(&six, threads, progress)?);
+        if threads > 1 {
+            alone_lifts.push(lift(specimen, folder, 1, progress)?.0);
+        }
+        own_drags.push(drag(&alone, threads, progress)?);
+    }
+    let (frames, one) = (medians(&lifts), medians(&alone_lifts));
+    let (own_drag, six_drag) = (median(&mut own_drags), median(&mut six_drags));
     let mean_ms = mean(frames.iter().map(|f| f.ms));
-    let one_ms = one.map_or(mean_ms, |one| mean(one.iter().map(|f| f.ms)));
+    let one_ms = if one.is_empty() { mean_ms } else { mean(one.iter().map(|f| f.ms)) };
     let mut sorted: Vec<f64> = frames.iter().map(|f| f.ms).collect();
     sorted.sort_by(f64::total_cmp);
     let p95 = sorted.get(sorted.len().saturating_sub(1) * 95 / 100).copied().unwrap_or(f64::NAN);
@@ -244,6 +266,16 @@ fn row(name: &str, specimen: &Specimen, folder: &Path, threads: usize, progress:
         held,
         phases: phases.collect(),
     })
+}
+
+/// The frames of several runs of a lift, each with the median of its times.
+fn medians(lifts: &[Vec<Frame>]) -> Vec<Frame> {
+    let Some(first) = lifts.first() else { return Vec::new() };
+    let of = |(k, frame): (usize, &Frame)| {
+        let mut times: Vec<f64> = lifts.iter().filter_map(|frames| frames.get(k)).map(|f| f.ms).collect();
+        Frame { ms: median(&mut times), ..*frame }
+    };
+    first.iter().enumerate().map(of).collect()
 }
 
 /// The organ's mesh in the cell's frame, z up, as scenes of benchmarks have it.
@@ -346,8 +378,8 @@ fn document(r: &LiftResult) -> Document {
             ("Iterations", &|(_, phase)| fixed(phase.iterations_per_frame, 0)),
         ],
     );
-    let lead = "From the first contact of the jaws to their release. Six: a frame of drag of six organs with as many \
-                elements in all.";
+    let lead = "From the first contact of the jaws to their release. The time of a frame is its median over the \
+                rounds. Six: a frame of drag of six organs with as many elements in all.";
     let machine = format!("{} threads on {}", r.threads, r.machine.described());
     Document::new("Lift", "Cost of one whole organ in the jaws")
         .with(Section::new("Organs", lead).table(table).lines(r.skipped.iter().cloned().chain([machine])))
