@@ -50,7 +50,7 @@ fn between(f: DVec3, corner: impl Fn(i64, i64, i64) -> f64) -> f64 {
 pub(crate) struct SmoothLine {
     seed: u64,
     first: i64,
-    /// From `first` on: the four corners at x, z before y.
+    /// From `first` on: the four corners at x, of which z varies fastest.
     corners: Vec<[f64; 4]>,
 }
 

@@ -18,7 +18,8 @@ use std::ops::Range;
 /// Points along each side of a pixel.
 pub(crate) const FINER: usize = 2;
 
-/// Greatest side of a picture that is refined (px): the points of a pixel take 150 bytes.
+/// Greatest side of a picture that is refined (px): the points of a pixel take 150 bytes, and 40
+/// more for each camera for which bodies at rest are kept.
 pub(crate) const MAX_SIDE: usize = 4096;
 
 /// Difference from a neighbour, of 255 levels of a channel, above which a pixel is refined.
@@ -53,7 +54,7 @@ pub(crate) struct KeptPoints<'a> {
     pub points: &'a Visibility,
     /// For each tile of points a box around what it shows (m, in the world).
     pub boxes: &'a [Option<[Vec3A; 2]>],
-    /// Whether a body is not among them.
+    /// Whether a body is not among them, and may move.
     pub moves: &'a (dyn Fn(usize) -> bool + Sync),
 }
 

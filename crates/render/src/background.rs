@@ -270,6 +270,9 @@ fn boxes(drawn: &Visibility, view: &View<'_>) -> Vec<Option<[Vec3A; 2]>> {
                     let p = view.origin + view.rotation * view.rays.through(u, v) * t;
                     let margin = Vec3A::splat(2.0 * offset(p));
                     let [low, high] = ends.unwrap_or([Vec3A::INFINITY, Vec3A::NEG_INFINITY]);
+                    if !p.is_finite() {
+                        return Some([Vec3A::MIN, Vec3A::MAX]);
+                    }
                     ends = Some([low.min(p - margin), high.max(p + margin)]);
                 }
             }

@@ -36,7 +36,7 @@ pub fn img(picture: &ColorImage, alt: &str) -> Result<String> {
 }
 
 /// The picture as PNG, if that is no larger than 40 kB or one and a half times its JPEG of `jpeg`
-/// bytes. A photograph is not tried: its PNG is several times as large.
+/// bytes. A picture like a photograph is not tried: a PNG of one is several times as large.
 fn small_png(rgb: &RgbImage, jpeg: usize) -> Result<Option<Vec<u8>>> {
     let encode = |compression| -> Result<Vec<u8>> {
         let mut png = Vec::new();

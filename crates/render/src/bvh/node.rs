@@ -8,7 +8,7 @@ pub(super) const WIDTH: usize = 8;
 pub(super) const NO_CHILD: u32 = u32::MAX;
 /// Marks a child that is a leaf.
 pub(super) const LEAF_BIT: u32 = 1 << 31;
-/// Entry node of a bounds_of_node tree.
+/// Entry node of a whole tree.
 pub(crate) const ROOT: u32 = 0;
 
 /// Size of the traversal stack: each level leaves at most seven siblings behind.

@@ -70,7 +70,7 @@ impl Stage {
         parts.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     }
 
-    /// Leaves out the candidates whose body does not `count`.
+    /// Keeps only the candidates whose body `counts`.
     pub(crate) fn retain(candidates: &mut BundleCandidates, counts: impl Fn(usize) -> bool) {
         candidates.parts.retain(|(_, body, _)| counts(*body as usize));
     }
@@ -88,7 +88,9 @@ impl Stage {
         self.lamps().iter().any(|lamp| {
             let origin = lamp.centre();
             self.top.beam(&Beam::new(origin, [low - origin, high - origin].into_iter()), leaves);
-            leaves.iter().any(|(near, leaf)| *near <= 1.0 && moves(self.entries[*leaf as usize].0 as usize))
+            // A distance that is not a number may be any.
+            let before = |near: f32| near.is_nan() || near <= 1.0;
+            leaves.iter().any(|(near, leaf)| before(*near) && moves(self.entries[*leaf as usize].0 as usize))
         })
     }
 

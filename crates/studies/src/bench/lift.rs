@@ -80,9 +80,9 @@ pub struct PhaseTiming {
     pub phase: String,
     /// Frames.
     pub frames: usize,
-    /// Mean wall time of a frame (ms).
+    /// Mean wall time of a frame (ms), each frame the median of its rounds.
     pub ms_per_frame: f64,
-    /// The slowest frame (ms).
+    /// The slowest such frame (ms).
     pub worst_ms: f64,
     /// Mean iterations of the solver in a frame, over all substeps.
     pub iterations_per_frame: f64,
@@ -99,7 +99,7 @@ pub struct LiftRow {
     pub elements: usize,
     /// Frames from the first contact of the jaws to their release.
     pub frames: usize,
-    /// Mean wall time of such a frame (ms).
+    /// Mean wall time of such a frame (ms), each the median of its rounds.
     pub ms_per_frame_mean: f64,
     /// Its 95th percentile (ms).
     pub ms_per_frame_p95: f64,
@@ -220,10 +220,10 @@ fn row(
     let elements = organ.body.tets.len();
     let six = Organs::analytic(elements)?;
     let (mut lifts, mut alone_lifts, mut own_drags, mut six_drags) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    let mut held = false;
+    let mut held = true;
     for _ in 0..rounds {
         let (frames, holds) = lift(specimen, folder, threads, progress)?;
-        held = holds;
+        held &= holds;
         lifts.push(frames);
         six_drags.push(drag(&six, threads, progress)?);
         if threads > 1 {
