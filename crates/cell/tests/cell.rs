@@ -3,8 +3,11 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 #![allow(clippy::print_stdout, reason = "what was measured, for those who ask with --nocapture")]
 
-use glam::{DMat3, DQuat, DVec3};
-use trocar_cell::{Action, ActionSpace, Cell, CellEvent, CellReport, ContactParts, Setpoint, Severance};
+mod common;
+
+use common::{go, over};
+use glam::{DQuat, DVec3};
+use trocar_cell::{Action, ActionSpace, Cell, CellEvent, CellReport, ContactParts, Setpoint};
 use trocar_core::Pose;
 use trocar_robot::wrench::ForceKind;
 use trocar_scene::{Arm, Drive, GraspDesignName, Scene, Side};
@@ -373,39 +376,6 @@ fn a_free_arm_refuses_what_it_cannot_do_and_keeps_the_speed_limits() {
     assert!((cell.measured_cp("left").unwrap().translation.y - 0.462).abs() < 1e-12);
 }
 
-/// The tip's pose with `at` (m) in mid-mouth of an arm, jaws across x.
-fn over(cell: &Cell, arm: &str, at: DVec3, beyond: f64) -> Pose {
-    let x = cell.workspace(arm).unwrap().direction_to(at);
-    let z = (DVec3::X - DVec3::X.dot(x) * x).normalize();
-    let pose = |z: DVec3| {
-        let rotation = DQuat::from_mat3(&DMat3::from_cols(x, z.cross(x), z)).normalize();
-        Pose { rotation, translation: at - (0.0115 - beyond) * x }
-    };
-    let near = cell.setpoint(arm).unwrap();
-    let turn = |p: &Pose| {
-        let s = cell.solve(arm, p, &near).unwrap();
-        (s.setpoint.roll() - near.roll()).abs() + 10.0 * s.roll_excess.abs()
-    };
-    let [one, other] = [pose(z), pose(-z)];
-    if turn(&one) <= turn(&other) { one } else { other }
-}
-
-/// Goes to a pose in `periods`, starting and stopping gently, and stays for half a second.
-fn go(cell: &mut Cell, arm: &str, pose: &Pose, periods: usize) -> Vec<CellReport> {
-    let from = cell.setpoint(arm).unwrap();
-    let start = cell.workspace(arm).unwrap().tip(&from);
-    (1..=periods + 15)
-        .map(|k| {
-            let t = (k as f64 / periods as f64).min(1.0);
-            let share = t * t * (3.0 - 2.0 * t);
-            let rotation = start.rotation.slerp(pose.rotation, share);
-            let translation = start.translation.lerp(pose.translation, share);
-            cell.servo_cp(arm, &Pose { rotation, translation }).unwrap();
-            cell.step(None).unwrap()
-        })
-        .collect()
-}
-
 #[test]
 fn pressing_on_stiff_tissue_neither_swings_nor_drifts_and_the_shaft_comes_back() {
     let mut specimen = two_tubes(Pins::Band { share: 0.42 }, 3e-3);
@@ -459,109 +429,6 @@ fn a_load_aside_leans_the_shaft_in_its_port() {
     assert!(load > 0.3, "{load} N");
     assert!(tip(&under) > tip(&before) || rcm(&under) > rcm(&before), "a loaded tip gives way");
     assert!(rcm(&under) < 3.0 && rcm(&after) < rcm(&before) + 0.1 && tip(&after) < tip(&before) + 0.2);
-}
-
-/// A cell of `scene` with tubes, in which the right cutter is open about the middle of the first.
-fn about_the_tube(scene: &Scene, pins: Pins) -> Cell {
-    let mut cell = Cell::new(scene, &two_tubes(pins, 2.2e-3), 1).unwrap();
-    let at = DVec3::new(0.005, 0.46, 0.045);
-    cell.servo_jaw("right", 1.0).unwrap();
-    let above = over(&cell, "right", at, -0.03);
-    let across = over(&cell, "right", at, 0.0);
-    go(&mut cell, "right", &above, 60);
-    go(&mut cell, "right", &across, 60);
-    assert_eq!(cell.in_jaws("right").unwrap(), Some(0));
-    cell
-}
-
-/// Steps the cell; the cuts, the opening of the right jaw, and the force on it (N).
-fn snip(cell: &mut Cell, jaw: f64, periods: usize) -> (Vec<Severance>, f64, f64) {
-    cell.servo_jaw("right", jaw).unwrap();
-    let mut cuts = Vec::new();
-    for _ in 0..periods {
-        let report = cell.step(None).unwrap();
-        assert!(report.tissue.divergence.is_none() && report.tissue.inverted == 0, "{:?}", report.tissue);
-        cuts.extend(report.events.into_iter().filter_map(|e| match e {
-            CellEvent::Cut { parted: Some(cut), .. } => Some(*cut),
-            _ => None,
-        }));
-    }
-    let arm = &cell.observe()[1];
-    (cuts, arm.measured.jaw(), arm.jaw_force)
-}
-
-/// Pinned tissue stops blades that turn, but not those that shear it.
-#[test]
-fn scissors_close_through_pinned_tissue() {
-    let mut cell = about_the_tube(&scene(), Pins::Band { share: 0.6 });
-    let (_, jaw, _) = snip(&mut cell, 0.0, 20);
-    assert!(jaw < 0.01, "{jaw} open");
-}
-
-#[test]
-fn scissors_keep_what_they_cut_and_weak_ones_stand() {
-    let mut scene = scene();
-    scene.task.sever = true;
-    let mut cell = about_the_tube(&scene, ONE_END);
-    // Half of it, then the rest, for which the work of the first half is not done again.
-    let (cuts, jaw, force) = snip(&mut cell, 0.45, 12);
-    assert!(cuts.is_empty() && (jaw - 0.45).abs() < 1e-9 && force > 1.0, "{cuts:?}, {force} N");
-    let (half, _, force) = snip(&mut cell, 1.0, 12);
-    assert_eq!((half.len(), half[0].outcome.as_str(), force), (1, "cut in part", 0.0));
-    let (rest, ..) = snip(&mut cell, 0.0, 12);
-    assert_eq!((rest.len(), rest[0].outcome.as_str()), (1, "severed"));
-    for cut in [&half[0], &rest[0]] {
-        println!("{} mJ, {} mm2", cut.work_mj, cut.section_mm2);
-    }
-    let (work, area) = (half[0].work_mj + rest[0].work_mj, half[0].section_mm2 + rest[0].section_mm2);
-    assert!(half[0].work_mj > 0.2 * work && (work / (0.3 * area) - 1.0).abs() < 0.1, "{work} mJ for {area} mm2");
-    // Two newtons are not enough.
-    scene.instruments.iter_mut().for_each(|i| i.jaw_force_n = 2.0);
-    let (cuts, jaw, force) = snip(&mut about_the_tube(&scene, ONE_END), 0.0, 15);
-    assert!(cuts.is_empty() && jaw > 0.3 && (force - 2.0).abs() < 1e-9, "{force} N, {jaw} open");
-}
-
-#[test]
-fn the_cutter_cuts_what_it_closes_on_and_parts_it_where_the_scene_says_so() {
-    for sever in [false, true] {
-        let mut scene = scene();
-        scene.task.sever = sever;
-        let mut cell = about_the_tube(&scene, ONE_END);
-        cell.servo_jaw("right", 0.0).unwrap();
-        let mut events = Vec::new();
-        for _ in 0..45 {
-            let report = cell.step(None).unwrap();
-            assert!(report.tissue.divergence.is_none() && report.tissue.inverted == 0, "{:?}", report.tissue);
-            events.extend(report.events);
-        }
-        let pieces: Vec<usize> = events
-            .iter()
-            .filter_map(|e| if let CellEvent::Cut { pieces, .. } = e { Some(*pieces) } else { None })
-            .collect();
-        assert_eq!(pieces, [if sever { 2 } else { 1 }]);
-        assert_eq!(cell.world().model.bodies().len(), if sever { 3 } else { 2 });
-        let parted =
-            events.iter().find_map(|e| if let CellEvent::Cut { parted, .. } = e { parted.clone() } else { None });
-        assert_eq!(parted.is_some(), sever);
-        if let Some(cut) = parted {
-            assert_eq!((cut.outcome.as_str(), cut.pieces.len()), ("severed", 2), "{cut:?}");
-            assert!(cut.opened_rad > 0.50 && cut.closed_rad < 0.16 && cut.between_blades_mm3 > 100.0, "{cut:?}");
-            assert!(cut.volume_error < 1e-6 && cut.inverted_after == 0, "{cut:?}");
-            // At 300 J/m2; less than a tenth of the jaws' force would not be felt.
-            assert!((cut.work_mj / (0.3 * cut.section_mm2) - 1.0).abs() < 0.1, "{cut:?}");
-            assert!((2.0..20.0).contains(&cut.force_peak_n), "{cut:?}");
-            // Its section is a disc of 9 mm, of faces that zigzag.
-            assert!((60.0..160.0).contains(&cut.area_mm2), "{cut:?}");
-            assert_eq!(cut.pieces.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), ["tube", "tube.1"]);
-        }
-        // A state with a cut is restored, and one from before it.
-        let saved = cell.save();
-        cell.step(None).unwrap();
-        let hash = cell.hash();
-        cell.restore(&saved).unwrap();
-        cell.step(None).unwrap();
-        assert_eq!(cell.hash(), hash);
-    }
 }
 
 #[test]
