@@ -279,7 +279,7 @@ def test_a_policy_whose_process_ends_after_an_episode_is_served_again(
         "    return {'actions': np.tile([*s[:5], *s[23:28]], (8, 1))}\n"
         "last = []\n"
         "def act(obs):\n    if last and obs['episode/step'] == 0:\n        os._exit(3)\n"
-        "    if obs['episode/step'] >= 24:\n        last.append(True)\n"
+        "    if obs['episode/step'] >= 8:\n        last.append(True)\n"
         "        threading.Timer(0.05, os._exit, [3]).start()\n    return still(obs)\n"
         "def slow(obs):\n    time.sleep(1.0)\n    return still(obs)\n"
     )
