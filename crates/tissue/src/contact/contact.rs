@@ -139,7 +139,7 @@ impl Contact {
 
     /// Displacement along the plane from the place (m).
     #[inline(always)]
-    fn off(&self, x: Vec3A) -> Vec3A {
+    pub fn off(&self, x: Vec3A) -> Vec3A {
         let off = x - self.place;
         off - off.dot(self.normal) * self.normal
     }

@@ -90,6 +90,8 @@ pub(super) struct Progress {
     pub longest: f32,
     /// Largest coordinate of the deviation from the body's free motion (m).
     pub gone: f32,
+    /// Norm of a gradient that cannot be told from zero (N).
+    pub rounding: f32,
 }
 
 impl QuasiNewtonSolver {
@@ -120,6 +122,7 @@ impl QuasiNewtonSolver {
                 stepped: true,
                 longest: 0.0,
                 gone: 0.0,
+                rounding: 0.0,
             },
             sleep: Sleep { active: true, ..Sleep::default() },
             rest: RestCache::new(&layout),
@@ -168,7 +171,7 @@ impl QuasiNewtonSolver {
     fn refresh_system(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState) {
         let Self { level, system, layout, held, touching, .. } = self;
         let stiffness = |vertex: usize| touching.contacts.stiffness(frame, body, state, vertex);
-        if system.refresh(*level, body, layout, held, &state.warm.supported, stiffness) {
+        if system.refresh(*level, layout, held, stiffness) {
             self.rest.correction = None;
         }
     }
@@ -248,14 +251,14 @@ impl QuasiNewtonSolver {
     /// Updates the system for the elements that are stiffened where the nodes are. The contacts are
     /// to be updated after it.
     pub fn update_stiffened(&mut self) {
-        let Self { level, system, layout, elements, held, iterate, .. } = self;
-        system.update_stiffened(*level, layout, elements, held, &iterate.x);
+        let Self { system, layout, elements, held, iterate, .. } = self;
+        system.update_stiffened(layout, elements, held, &iterate.x);
     }
 
-    /// Updates the system for the contacts that press where the nodes are.
+    /// Updates the system for the contacts as they are where the nodes are.
     pub fn update_contacts(&mut self) {
-        let Self { level, system, layout, touching, held, iterate, .. } = self;
-        system.update_contacts(*level, layout, &touching.contacts, held, &iterate.x);
+        let Self { level, system, layout, touching: Touching { contacts, limits, .. }, held, iterate, .. } = self;
+        system.update_contacts(*level, layout, (contacts, limits), held, &iterate.x);
     }
 
     /// Writes the gradient of the body's own potential into the next gradient, from the forces of
@@ -387,6 +390,12 @@ impl QuasiNewtonSolver {
     /// Largest coordinate of any free node (m).
     pub fn extent(&self) -> f32 {
         dispatch!(self.level, _simd => max_coordinate(&self.iterate.x[..self.layout.free]))
+    }
+
+    /// Norm of the gradient (N).
+    pub fn gradient_norm(&self) -> f32 {
+        let gradient = &self.iterate.gradient;
+        dispatch!(self.level, simd => dot_rows(simd, gradient, gradient)).sqrt()
     }
 
     /// Sum of the gradient over the nodes (N).

@@ -26,6 +26,8 @@ pub(super) struct Factor {
     added: Vec<f32>,
     /// Stiffness by which tools hold nodes or supports carry them (N/m).
     pub holding: Vec<f32>,
+    /// Norm of the diagonal over nodes that tools do not hold, without `holding` (N/m).
+    pub norm: f32,
     cholesky: Cholesky<f32>,
     tiles: Tiles,
 }
@@ -58,6 +60,7 @@ impl Factor {
             scale: vec![0.0; 3 * rank.len()],
             added: vec![0.0; rank.len()],
             holding: vec![0.0; rank.len()],
+            norm: 0.0,
             order: cholesky.order().iter().map(|i| rest.free()[*i as usize] as u32).collect(),
             rank,
             rest,
@@ -76,16 +79,20 @@ impl Factor {
     /// Factorises with the `held` nodes held by a large stiffness and the others by `supports`
     /// (N/m). False if the matrix is not positive definite.
     pub fn factorise(&mut self, level: Level, held: &[bool], supports: &[f32]) -> bool {
-        let Self { rank, rest, scale, added, holding, cholesky, .. } = self;
+        let Self { rank, rest, scale, added, holding, norm, cholesky, .. } = self;
+        let mut squares = 0.0;
         for (i, rank) in rank.iter().enumerate() {
             let node = *rank as usize;
             let own = rest.matrix().diagonal(i);
             let first = own.x_axis.x as f32 + added[node];
             holding[node] = if held[node] { HOLDING_FACTOR * first } else { supports[node] };
             for c in 0..3 {
-                scale[3 * node + c] = 1.0 / (own.col(c)[c] as f32 + added[node] + holding[node]).sqrt();
+                let diagonal = own.col(c)[c] as f32 + added[node];
+                scale[3 * node + c] = 1.0 / (diagonal + holding[node]).sqrt();
+                squares += if held[node] { 0.0 } else { f64::from(diagonal * diagonal) };
             }
         }
+        *norm = squares.sqrt() as f32;
         let scaled = rest.matrix().blocks().map(|(row, column, block)| {
             let [rows, columns] = [row, column].map(|i| 3 * rank[i as usize] as usize);
             let number = |r: usize, c: usize| match row == column && r == c {

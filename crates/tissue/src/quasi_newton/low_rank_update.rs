@@ -1,50 +1,46 @@
-//! Contacts that differ from those in the factor, and elements that are far stiffer than at rest,
-//! as a low-rank update of the inverse.
+//! What differs from the factor, as a low-rank update of the inverse.
 //!
-//! The factor contains the stiffness of the nodes that pressed when it was made. New, harder and
-//! lost contacts differ from it by a stiffness on a few nodes: a matrix U K U' of low rank. With
-//! A = L L' Woodbury's formula (Hager 1989, "Updating the inverse of a matrix") becomes
+//! The factor contains the stiffness at rest and that of the nodes that pressed when it was made.
+//! Contacts that are new, harder or lost, that slide, and elements that are far stiffer than at
+//! rest differ from it by springs on a few nodes: a matrix U K U' of low rank. With A = L L'
+//! Woodbury's formula (Hager 1989, "Updating the inverse of a matrix") becomes
 //! (A + U K U')^-1 = L'^-1 (1 - V (K^-1 + V'V)^-1 V') L^-1 with V = L^-1 U: a correction between
-//! the two halves of a solve. The columns of V are short ([`HalfColumn`]). A node has three, which
-//! are solved for once: the stiffness is the same in all directions, so they are kept in the
-//! tissue's rest frame and stay valid however it turns.
+//! the two halves of a solve.
 //!
-//! A stiffened element has one direction and one column, which is solved for in every substep.
+//! V is made of the columns of nodes ([`HalfColumns`]). They are kept in the tissue's rest frame
+//! until the factor changes, and stay valid however the tissue turns. Springs that come, go, turn
+//! or harden need no other solve.
 
 use super::factor::Factor;
-use super::half_column::HalfColumn;
-use super::stiffened::{MAX_STIFFENED, Stiffened};
+use super::half_columns::HalfColumns;
+use super::springs::Springs;
 use fearless_simd::Simd;
 
 /// Greatest number of nodes in the update.
-const MAX_NODES: usize = 48;
+const MAX_NODES: usize = 128;
 
-/// Greatest number of directions in the update, and of columns.
-const MAX_DIRECTIONS: usize = 3 * MAX_NODES + MAX_STIFFENED;
+/// Greatest number of springs in the update.
+const MAX_SPRINGS: usize = 256;
 
-/// The difference between the matrix now and the factor. Its directions are three of each node,
-/// then one of each stiffened element.
+/// The difference between the matrix now and the factor.
 pub(super) struct LowRankUpdate {
-    /// Nodes and the stiffness that is added (N/m); those whose stiffness is taken out of the
-    /// factor come first.
-    nodes: Vec<(u32, f32)>,
-    next: Vec<(u32, f32)>,
-    /// Index of each node's columns.
+    /// The springs.
+    springs: Springs,
+    /// The place of each of their terms' nodes.
     places: Vec<usize>,
-    /// Nodes whose columns are known: the first three columns are those of the first.
+    /// The places of all their nodes, each once.
+    used: Vec<usize>,
+    /// Nodes whose columns are known, by place.
     known: Vec<u32>,
-    /// Elements that are stiffened, gradients in the rest frame.
-    stiffened: Vec<Stiffened>,
-    /// Columns: three of each place, then one of each stiffened element.
-    columns: Vec<HalfColumn>,
-    /// V'V of all columns.
-    products: Vec<f64>,
-    /// Whether the elements have changed since the matrix was made.
-    stale: bool,
-    /// K^-1 + V'V of the directions as L D L', by columns: what is below the diagonal of L, and D
-    /// on it.
+    columns: Vec<HalfColumns>,
+    /// Products of the columns of two places, by pair of places, the greater one first.
+    products: Vec<[[f64; 3]; 3]>,
+    /// K^-1 + V'V as L D L', by columns: what is below the diagonal of L, and D on it.
     matrix: Vec<f64>,
+    /// Scratch: one number a spring.
     shares: Vec<f64>,
+    /// Scratch: three numbers a place.
+    of_places: Vec<[f64; 3]>,
     /// Whether the matrix is that of a sum that is positive definite.
     usable: bool,
 }
@@ -53,16 +49,15 @@ impl LowRankUpdate {
     /// An empty one.
     pub fn new() -> Self {
         Self {
-            nodes: Vec::with_capacity(MAX_NODES),
-            next: Vec::with_capacity(MAX_NODES),
-            places: Vec::with_capacity(MAX_NODES),
-            known: Vec::with_capacity(MAX_NODES),
-            stiffened: Vec::with_capacity(MAX_STIFFENED),
-            columns: vec![HalfColumn::default(); MAX_DIRECTIONS],
-            products: vec![0.0; MAX_DIRECTIONS * MAX_DIRECTIONS],
-            stale: false,
-            matrix: vec![0.0; MAX_DIRECTIONS * MAX_DIRECTIONS],
-            shares: vec![0.0; MAX_DIRECTIONS],
+            springs: Springs::default(),
+            places: Vec::new(),
+            used: Vec::new(),
+            known: Vec::new(),
+            columns: Vec::new(),
+            products: Vec::new(),
+            matrix: Vec::new(),
+            shares: Vec::new(),
+            of_places: Vec::new(),
             usable: false,
         }
     }
@@ -73,164 +68,152 @@ impl LowRankUpdate {
         self.reset();
     }
 
-    /// Makes the update empty: the contacts are those in the factor, and no element is stiffened.
+    /// Makes the update empty.
     pub fn reset(&mut self) {
-        self.nodes.clear();
-        self.stiffened.clear();
-        (self.usable, self.stale) = (false, false);
+        self.springs.clear();
+        self.usable = false;
     }
 
-    /// Takes the stiffened elements out.
-    pub fn forget_stiffened(&mut self) {
-        if !self.stiffened.is_empty() {
-            self.stiffened.clear();
-            self.usable = self.factorise();
-        }
-    }
-
-    /// Whether [`Self::set`] is to follow, because elements have changed.
-    pub fn is_stale(&self) -> bool {
-        self.stale
-    }
-
-    /// What the update adds to a node's stiffness (N/m).
+    /// What the update adds to the stiffness of a node that has one stiffness in all directions
+    /// (N/m).
     pub fn added(&self, node: u32) -> f32 {
-        let known = self.nodes.iter().filter(|(i, _)| self.usable && *i == node);
-        known.map(|(_, stiffness)| stiffness).sum()
+        if !self.usable {
+            return 0.0;
+        }
+        let own = |range: std::ops::Range<usize>| self.springs.terms()[range].iter().all(|term| term.node == node);
+        let springs = self.springs.ranges().filter(|(_, range)| own(range.clone()));
+        springs.map(|(stiffness, _)| stiffness).sum::<f32>() / 3.0
     }
 
-    /// Sets the nodes that differ (N/m): first those whose stiffness is taken out of the factor,
-    /// with a negative one, then those that get more; each kind ascending. Nodes beyond the
-    /// greatest number are left out.
+    /// Sets the springs: first those that are added, then those that are taken away, which leave
+    /// something of what the factor has. Springs beyond the greatest numbers are left out.
     #[inline(always)]
-    pub fn set<S: Simd>(
-        &mut self,
-        simd: S,
-        factor: &mut Factor,
-        scratch: &mut [f32],
-        nodes: impl Iterator<Item = (u32, f32)>,
-    ) {
-        self.next.clear();
-        self.next.extend(nodes.take(MAX_NODES));
-        if self.next == self.nodes && !self.stale {
+    pub fn set<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32], springs: &Springs) {
+        // The springs that were left out are not compared: there are seldom any.
+        if springs.are_like(&self.springs) {
             return;
         }
-        self.stale = false;
-        std::mem::swap(&mut self.nodes, &mut self.next);
-        self.solve_nodes(simd, factor, scratch);
-        self.usable = self.factorise();
+        self.springs.clone_from(springs);
+        self.springs.truncate(MAX_SPRINGS);
+        self.find_places(simd, factor, scratch);
+        self.usable = self.factorise(simd);
     }
 
-    /// Sets the stiffened elements, gradients in the rest frame, at most [`MAX_STIFFENED`]. The
-    /// nodes are to be set after it.
+    /// Finds the places of all terms, and solves for the columns of nodes that are not known.
     #[inline(always)]
-    pub fn set_stiffened<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32], found: &[Stiffened]) {
-        if self.stiffened == found {
-            return;
-        }
-        self.stiffened.clear();
-        for (e, element) in found.iter().enumerate() {
-            let column = 3 * MAX_NODES + e;
-            self.columns[column].solve(simd, factor, scratch, element.numbers());
-            self.stiffened.push(*element);
-            self.multiply(simd, column);
-        }
-        self.stale = true;
-    }
-
-    /// Solves for the columns of nodes that are not known.
-    #[inline(always)]
-    fn solve_nodes<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32]) {
+    fn find_places<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32]) {
+        self.keep_springs();
+        let mut unused = 0;
         self.places.clear();
-        for k in 0..self.nodes.len() {
-            let node = self.nodes[k].0;
+        self.used.clear();
+        for t in 0..self.springs.terms().len() {
+            let node = self.springs.terms()[t].node;
             // Solves in a closure that is not inlined would be compiled without the instruction set
             // of `S`, and each of their operations would be a call.
-            if let Some(place) = self.known.iter().position(|known| *known == node) {
-                self.places.push(place);
-                continue;
-            }
-            let unused = |known: &u32| self.nodes.iter().all(|(node, _)| node != known);
-            let free = if self.known.len() < MAX_NODES { None } else { self.known.iter().position(unused) };
-            let place = free.unwrap_or(self.known.len());
-            if place < self.known.len() {
-                self.known[place] = node;
-            } else {
-                self.known.push(node);
-            }
-            for c in 0..3 {
-                let unit = std::iter::once((3 * node as usize + c, 1.0));
-                self.columns[3 * place + c].solve(simd, factor, scratch, unit);
-            }
-            for c in 0..3 {
-                self.multiply(simd, 3 * place + c);
-            }
+            let place = match self.known.iter().position(|known| *known == node) {
+                Some(place) => place,
+                None => {
+                    let place = if self.known.len() < MAX_NODES {
+                        self.known.push(node);
+                        self.known.len() - 1
+                    } else {
+                        // A place whose node no spring has.
+                        while self.springs.terms().iter().any(|term| term.node == self.known[unused]) {
+                            unused += 1;
+                        }
+                        self.known[unused] = node;
+                        unused
+                    };
+                    self.solve(simd, factor, scratch, place);
+                    place
+                }
+            };
             self.places.push(place);
+            if !self.used.contains(&place) {
+                self.used.push(place);
+            }
         }
     }
 
-    /// Multiplies a column with all that are in use.
+    /// Leaves out the first spring that would need more nodes than there may be, and all after it.
+    fn keep_springs(&mut self) {
+        let mut nodes: Vec<u32> = Vec::with_capacity(MAX_NODES);
+        let mut kept = 0;
+        for (_, range) in self.springs.ranges() {
+            for term in &self.springs.terms()[range] {
+                if !nodes.contains(&term.node) {
+                    nodes.push(term.node);
+                }
+            }
+            if nodes.len() > MAX_NODES {
+                break;
+            }
+            kept += 1;
+        }
+        self.springs.truncate(kept);
+    }
+
+    /// Solves for the columns of a place, and multiplies them with all others.
     #[inline(always)]
-    fn multiply<S: Simd>(&mut self, simd: S, column: usize) {
-        let of_elements = 3 * MAX_NODES..3 * MAX_NODES + self.stiffened.len();
-        for other in (0..3 * self.known.len()).chain(of_elements) {
-            let product = self.columns[column].product_with(simd, &self.columns[other]);
-            self.products[column * MAX_DIRECTIONS + other] = product;
-            self.products[other * MAX_DIRECTIONS + column] = product;
+    fn solve<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32], place: usize) {
+        if place == self.columns.len() {
+            self.columns.push(HalfColumns::default());
+        }
+        self.columns[place].solve(simd, factor, scratch, self.known[place] as usize);
+        self.products.resize(self.known.len() * (self.known.len() + 1) / 2, [[0.0; 3]; 3]);
+        for other in 0..self.known.len() {
+            let (first, second) = (place.max(other), place.min(other));
+            let product = self.columns[first].product_with(simd, &self.columns[second]);
+            self.products[pair(first, second)] = product;
         }
     }
 
-    /// Number of directions.
-    fn directions(&self) -> usize {
-        3 * self.nodes.len() + self.stiffened.len()
+    /// Builds the matrix of the springs and its L D L'. False if the sum is not positive definite.
+    #[inline(always)]
+    fn factorise<S: Simd>(&mut self, simd: S) -> bool {
+        let n = self.springs.len();
+        self.matrix.clear();
+        self.matrix.resize(n * n, 0.0);
+        self.build();
+        simd.vectorize(
+            #[inline(always)]
+            || decompose(&mut self.matrix, n),
+        );
+        // Springs that are taken away make D negative there, added ones positive: it is
+        // quasi-definite.
+        let positive = |(j, (stiffness, _)): (usize, (f32, _))| self.matrix[j * n + j] * f64::from(stiffness) > 0.0;
+        n > 0 && self.springs.ranges().enumerate().all(positive)
     }
 
-    /// Stiffness of a direction.
-    fn stiffness(&self, i: usize) -> f64 {
-        f64::from(match i.checked_sub(3 * self.nodes.len()) {
-            None => self.nodes[i / 3].1,
-            Some(e) => self.stiffened[e].stiffness,
-        })
-    }
-
-    /// Index of a direction's column.
-    fn column(&self, i: usize) -> usize {
-        match i.checked_sub(3 * self.nodes.len()) {
-            None => 3 * self.places[i / 3] + i % 3,
-            Some(e) => 3 * MAX_NODES + e,
-        }
-    }
-
-    /// Builds the matrix of the directions and its L D L'. False if the sum is not positive
-    /// definite.
-    fn factorise(&mut self) -> bool {
-        let n = self.directions();
-        for j in 0..n {
-            let products = MAX_DIRECTIONS * self.column(j);
-            for i in j..n {
-                self.matrix[j * n + i] = self.products[products + self.column(i)];
+    /// K^-1 + V'V, from the diagonal down.
+    fn build(&mut self) {
+        let n = self.springs.len();
+        let Self { springs, places, known, products, matrix, of_places, used, .. } = self;
+        of_places.resize(known.len(), [0.0; 3]);
+        let terms = springs.terms();
+        for (j, (stiffness, range)) in springs.ranges().enumerate() {
+            // V'V of all nodes times this spring's vectors.
+            used.iter().for_each(|place| of_places[*place] = [0.0; 3]);
+            for (term, from) in terms[range.clone()].iter().zip(&places[range]) {
+                for to in used.iter() {
+                    let block = &products[pair(*from.max(to), *from.min(to))];
+                    let sum = &mut of_places[*to];
+                    for (r, sum) in sum.iter_mut().enumerate() {
+                        for (c, along) in term.along.iter().enumerate() {
+                            let product = if from <= to { block[r][c] } else { block[c][r] };
+                            *sum += product * f64::from(*along);
+                        }
+                    }
+                }
             }
-            self.matrix[j * n + j] += 1.0 / self.stiffness(j);
-        }
-        for j in 0..n {
-            let (before, column) = self.matrix.split_at_mut(j * n);
-            let column = &mut column[j..n];
-            for before in before.chunks_exact(n).enumerate().map(|(k, before)| &before[k..]) {
-                // D first, then the numbers of L below it.
-                let part = &before[before.len() - column.len()..];
-                let share = before[0] * part[0];
-                column.iter_mut().zip(part).for_each(|(sum, l)| *sum -= share * l);
+            let column = &mut matrix[j * n..(j + 1) * n];
+            for (number, (_, range)) in column.iter_mut().zip(springs.ranges()).skip(j) {
+                for (term, place) in terms[range.clone()].iter().zip(&places[range]) {
+                    *number += dot(&term.along, &of_places[*place]);
+                }
             }
-            // Removed contacts make the matrix negative there, added ones positive: it is
-            // quasi-definite.
-            let d = column[0];
-            column[1..].iter_mut().for_each(|l| *l /= d);
-            let signed = d * self.stiffness(j);
-            if signed.is_nan() || signed <= 0.0 {
-                return false;
-            }
+            column[j] += 1.0 / f64::from(stiffness);
         }
-        n > 0
     }
 
     /// Turns `y`, solved by half with the factor, into that of the sum.
@@ -239,22 +222,62 @@ impl LowRankUpdate {
         if !self.usable {
             return;
         }
-        let n = self.directions();
-        for i in 0..n {
-            self.shares[i] = self.columns[self.column(i)].product(simd, y);
+        let Self { springs, places, used, columns, matrix, shares, of_places, .. } = self;
+        let terms = springs.terms();
+        for place in used.iter() {
+            of_places[*place] = columns[*place].product(simd, y);
         }
-        let shares = &mut self.shares[..n];
-        for (k, l) in self.matrix.chunks_exact(n).take(n).enumerate() {
+        shares.clear();
+        for (_, range) in springs.ranges() {
+            let products = terms[range.clone()].iter().zip(&places[range]);
+            shares.push(products.map(|(term, place)| dot(&term.along, &of_places[*place])).sum());
+        }
+        let n = shares.len();
+        for (k, l) in matrix.chunks_exact(n).enumerate() {
             let (solved, below) = shares.split_at_mut(k + 1);
             below.iter_mut().zip(&l[k + 1..]).for_each(|(sum, l)| *sum -= solved[k] * l);
         }
-        for (k, l) in self.matrix.chunks_exact(n).take(n).enumerate().rev() {
+        for (k, l) in matrix.chunks_exact(n).enumerate().rev() {
             let known: f64 = l[k + 1..].iter().zip(&shares[k + 1..]).map(|(l, share)| l * share).sum();
             shares[k] = shares[k] / l[k] - known;
         }
-        for i in 0..n {
-            self.columns[self.column(i)].subtract(self.shares[i] as f32, y);
+        used.iter().for_each(|place| of_places[*place] = [0.0; 3]);
+        for (share, (_, range)) in shares.iter().zip(springs.ranges()) {
+            for (term, place) in terms[range.clone()].iter().zip(&places[range]) {
+                let sum = &mut of_places[*place];
+                sum.iter_mut().zip(term.along).for_each(|(sum, along)| *sum += share * f64::from(along));
+            }
         }
+        for place in used.iter() {
+            columns[*place].subtract(of_places[*place], y);
+        }
+    }
+}
+
+/// Index of a pair of places, of which the first is not the lesser one.
+fn pair(first: usize, second: usize) -> usize {
+    first * (first + 1) / 2 + second
+}
+
+fn dot(along: &[f32; 3], v: &[f64; 3]) -> f64 {
+    along.iter().zip(v).map(|(a, v)| f64::from(*a) * v).sum()
+}
+
+/// L D L' of a symmetric matrix of `n` columns in place, of which only what is not above the
+/// diagonal is read and written.
+#[inline(always)]
+fn decompose(matrix: &mut [f64], n: usize) {
+    for j in 0..n {
+        let (before, column) = matrix.split_at_mut(j * n);
+        let column = &mut column[j..n];
+        for before in before.chunks_exact(n).enumerate().map(|(k, before)| &before[k..]) {
+            // D first, then the numbers of L below it.
+            let part = &before[before.len() - column.len()..];
+            let share = before[0] * part[0];
+            column.iter_mut().zip(part).for_each(|(sum, l)| *sum -= share * l);
+        }
+        let d = column[0];
+        column[1..].iter_mut().for_each(|l| *l /= d);
     }
 }
 
@@ -262,13 +285,14 @@ impl LowRankUpdate {
 mod tests {
     use super::LowRankUpdate;
     use crate::quasi_newton::factor::Factor;
-    use crate::quasi_newton::stiffened::Stiffened;
+    use crate::quasi_newton::springs::{Springs, Term};
     use crate::{BodyDescription, ConstitutiveModel, Isa, Material, ModelBuilder};
     use fearless_simd::dispatch;
+    use glam::Vec3A;
     use trocar_testing::blocks::block;
 
     /// Nodes that press in the factor and now, softly or hard, a node that no longer does, and
-    /// stiffened elements: a solve with the update is that with a factor of all that.
+    /// springs between nodes: a solve with the update is that with a factor of all that.
     #[test]
     fn an_updated_solve_is_that_of_the_sum() {
         // The tree of the larger one is cut into parts.
@@ -305,27 +329,21 @@ mod tests {
             supports[nodes[0]] = 0.0;
             supports[nodes[1]] = 25.0 * stiffness;
             nodes[2..].iter().for_each(|i| supports[*i] = stiffness);
-            // A stiffened element of one node is a spring at it.
-            let along = nodes[3];
             assert!(after.factorise(level, &held, &supports));
-            let element = |c: usize| {
-                let mut gradient = [[0.0; 3]; 4];
-                gradient[0][c] = 1.0;
-                Stiffened { nodes: [along as u32, 0, 0, 0], gradient, stiffness }
-            };
-            let differs = [
-                (nodes[0] as u32, -stiffness),
-                (nodes[1] as u32, 24.0 * stiffness),
-                (nodes[2] as u32, stiffness),
-                (nodes[4] as u32, stiffness),
-            ];
+            let mut springs = Springs::default();
+            springs.push_alike(24.0 * stiffness, nodes[1] as u32);
+            springs.push_alike(stiffness, nodes[2] as u32);
+            // Three springs at right angles are one that is alike in all directions.
+            let along = [[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]];
+            along.into_iter().for_each(|along| springs.push(stiffness, [Term { node: nodes[3] as u32, along }]));
+            springs.push_alike(-stiffness, nodes[0] as u32);
+            springs.push_alike(stiffness, nodes[4] as u32);
             let right: Vec<f32> = (0..3 * free).map(|i| ((7 * i) % 11) as f32 - 5.0).collect();
             let [mut x, mut y, mut without] = [(); 3].map(|()| [&right[..], &[0.0; 16]].concat());
             let mut scratch = vec![0.0; x.len()];
             let mut update = LowRankUpdate::new();
             dispatch!(level, simd => {
-                update.set_stiffened(simd, &mut before, &mut scratch, &[element(0), element(1), element(2)]);
-                update.set(simd, &mut before, &mut scratch, differs.into_iter());
+                update.set(simd, &mut before, &mut scratch, &springs);
                 before.forward(simd, &mut x, true);
                 update.apply(simd, &mut x);
                 before.backward(simd, &mut x, true);
@@ -338,6 +356,39 @@ mod tests {
             let off = |x: &[f32]| x.iter().zip(&y).fold(0.0f32, |most, (x, y)| most.max((x - y).abs())) / most;
             let (error, change) = (off(&x), off(&without));
             assert!(error < 2e-3 && change > 10.0 * error, "{cells:?}: off by {error}, by {change} without the update");
+            // Springs between nodes are not in any factor: the solution has to fulfil its equation.
+            supports[nodes[1]] = stiffness;
+            let between = [(1, 0.5), (2, 0.3), (4, 0.2)].map(|(k, share)| Term { node: nodes[k] as u32, along: [share; 3] });
+            springs.clear();
+            springs.push(25.0 * stiffness, between);
+            springs.push(stiffness, between[..2].iter().map(|term| Term { along: [0.6, -0.8, 0.1], ..*term }));
+            springs.push(-stiffness, [Term { node: nodes[0] as u32, along: [0.0, 0.6, 0.8] }]);
+            let mut x = [&right[..], &[0.0; 16]].concat();
+            dispatch!(level, simd => {
+                update.set(simd, &mut before, &mut scratch, &springs);
+                before.forward(simd, &mut x, true);
+                update.apply(simd, &mut x);
+                before.backward(simd, &mut x, true);
+            });
+            let at = |i: usize| Vec3A::from_slice(&x[3 * i..]);
+            let mut product = vec![Vec3A::ZERO; free];
+            before.multiply(at, &mut product);
+            product[nodes[0]] += stiffness * at(nodes[0]);
+            product[nodes[1]] += stiffness * at(nodes[1]);
+            let without = product.clone();
+            for (stiffness, range) in springs.ranges() {
+                let terms = &springs.terms()[range];
+                let off: f32 = terms.iter().map(|term| Vec3A::from(term.along).dot(at(term.node as usize))).sum();
+                for term in terms {
+                    product[term.node as usize] += stiffness * off * Vec3A::from(term.along);
+                }
+            }
+            let off = |product: &[Vec3A]| {
+                let rights = right.chunks_exact(3).map(Vec3A::from_slice);
+                product.iter().zip(rights).fold(0.0f32, |most, (a, b)| most.max((*a - b).length()))
+            };
+            let (error, change) = (off(&product), off(&without));
+            assert!(error < 0.05 && change > 10.0 * error, "{cells:?}: off by {error} N, by {change} N without springs");
         }
     }
 }

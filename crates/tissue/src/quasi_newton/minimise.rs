@@ -15,6 +15,11 @@ const MAX_FRICTION_ROUNDS: usize = 4;
 /// most this many times the one that ends a substep: rounding, not a failed search.
 const MAX_ROUNDING_FACTOR: f32 = 100.0;
 
+/// Positions are rounded to `f32::EPSILON` of the body's extent. A gradient whose norm is this share
+/// of what the diagonal of the matrix makes of that is rounding: in lifts of whole organs it stays
+/// at 0.1 to 0.2 of it, however many steps follow.
+const ROUNDING_SHARE: f32 = 0.25;
+
 impl IslandSystem<'_> {
     /// Minimises the potential of a substep, which ends when `share` of the frame is over.
     ///
@@ -46,11 +51,14 @@ impl IslandSystem<'_> {
                 // Nothing moves, and nothing has moved.
                 return true;
             }
-            self.find_direction();
-            self.count_iteration();
-            let scale = self.history.scale;
-            self.for_active(|body| body.measure_direction(iteration == 0, scale));
-            if self.is_solved(absolute, relative) {
+            let is_rounding = iteration > 0 && self.is_rounding();
+            if !is_rounding {
+                self.find_direction();
+                self.count_iteration();
+                let scale = self.history.scale;
+                self.for_active(|body| body.measure_direction(iteration == 0, scale));
+            }
+            if is_rounding || self.is_solved(absolute, relative) {
                 if iteration > 0 || moved {
                     if !alone && self.wake(absolute, relative) {
                         continue;
@@ -120,6 +128,7 @@ impl IslandSystem<'_> {
         self.take_gradient();
         self.accept_gradient();
         self.refresh_limits();
+        self.measure_rounding();
         if alone {
             return;
         }
@@ -132,6 +141,18 @@ impl IslandSystem<'_> {
         if self.all().any(|body| body.sleep.was_resting == body.sleep.active) {
             self.history.clear();
         }
+    }
+
+    /// Measures which gradients are rounding.
+    fn measure_rounding(&mut self) {
+        for body in self.all() {
+            body.progress.rounding = ROUNDING_SHARE * f32::EPSILON * body.extent() * body.system.norm();
+        }
+    }
+
+    /// Whether the gradients of all bodies that take part cannot be told from zero.
+    fn is_rounding(&mut self) -> bool {
+        self.active().all(|body| body.gradient_norm() <= body.progress.rounding)
     }
 
     /// Lets a single body stay where it is, if it is at rest.

@@ -41,11 +41,9 @@ impl Stiffened {
         self.stiffness * self.gradient.as_flattened().iter().map(|g| g * g).sum::<f32>()
     }
 
-    /// The gradient's numbers, with their places in a vector of three numbers a node.
-    #[inline(always)]
-    pub fn numbers(&self) -> impl Iterator<Item = (usize, f32)> {
-        let nodes = self.nodes.iter().zip(&self.gradient).filter(|(_, g)| **g != [0.0; 3]);
-        nodes.flat_map(|(node, g)| (0..3).map(move |c| (3 * *node as usize + c, g[c])))
+    /// The gradient at each node that is free.
+    pub fn gradients(&self) -> impl Iterator<Item = (u32, [f32; 3])> {
+        self.nodes.into_iter().zip(self.gradient).filter(|(_, g)| *g != [0.0; 3])
     }
 }
 

@@ -1,11 +1,13 @@
 //! The linear system of one body: its stiffness at rest with the masses of a substep, factorised
 //! once, turned with the tissue, and updated for contacts. It preconditions the search.
 
+use super::contact_springs::{ContactSprings, Placed};
 use super::elements::Elements;
 use super::factor::Factor;
 use super::iterate::{add, position};
 use super::layout::Layout;
 use super::low_rank_update::LowRankUpdate;
+use super::springs::Term;
 use super::stiffened::{MAX_STIFFENED, Stiffened};
 use super::warp::Warp;
 use crate::Body;
@@ -14,9 +16,6 @@ use crate::lanes::Row;
 use fearless_simd::{Level, dispatch};
 use glam::{Mat3A, Vec3A};
 
-/// A node that presses harder than in the factor by less than this share is taken as it is there.
-const MIN_HARDER: f32 = 0.5;
-
 /// The preconditioner of one body.
 pub(super) struct System {
     /// None if no node is free.
@@ -24,16 +23,18 @@ pub(super) struct System {
     /// Contacts and stiffness of stiffened elements that are not in the factor, or no longer there.
     update: LowRankUpdate,
     warp: Warp,
-    /// Nodes that press in the factor, and their stiffness (N/m); negative where they no longer do.
-    known: Vec<(u32, f32)>,
     /// Nodes that tools carry in the factor.
     held: Vec<bool>,
-    /// Stiffness of the contacts and grasps of free nodes in the factor (N/m).
+    /// Stiffness of the contacts and grasps of free nodes in the factor (N/m), and whether there is
+    /// any.
     contacts: Vec<f32>,
+    has_contacts: bool,
     /// Whether the factor is that of the matrix.
     pub usable: bool,
-    /// Scratch: stiffness of what presses each free node now (N/m).
-    pressing: Vec<f32>,
+    /// The springs of the stiffened elements, and then those of contacts.
+    springs: ContactSprings,
+    /// Number of those of elements.
+    of_elements: usize,
     /// Scratch: the stiffened elements.
     stiffened: Vec<Stiffened>,
     /// Scratch: the vector of a solve.
@@ -57,10 +58,11 @@ impl System {
             usable: factor.is_some() || layout.free == 0,
             update: LowRankUpdate::new(),
             warp: Warp::new(&layout),
-            known: Vec::with_capacity(layout.free),
             held,
             contacts,
-            pressing: vec![0.0; layout.free],
+            has_contacts: false,
+            springs: ContactSprings::new(&layout),
+            of_elements: 0,
             stiffened: Vec::with_capacity(MAX_STIFFENED),
             right: vec![0.0; 3 * layout.rows + 16],
             factor,
@@ -69,15 +71,12 @@ impl System {
     }
 
     /// Factorises again unless the factor is the one for the `held` nodes and the stiffness of
-    /// contacts at each vertex (N/m). `supported` marks the vertices that press. Returns whether it
-    /// did.
+    /// contacts at each vertex (N/m). Returns whether it did.
     pub fn refresh(
         &mut self,
         level: Level,
-        body: &Body,
         layout: &Layout,
         held: &[bool],
-        supported: &[bool],
         stiffness: impl Fn(usize) -> f32,
     ) -> bool {
         let Some(factor) = &mut self.factor else { return false };
@@ -89,12 +88,7 @@ impl System {
         }
         if stale {
             self.update.clear();
-            self.known.clear();
-            for (i, vertex) in layout.vertex[..layout.free].iter().enumerate() {
-                if supported[*vertex as usize] {
-                    self.known.push((i as u32, body.pressed_stiffness(*vertex as usize)));
-                }
-            }
+            self.has_contacts = self.contacts.iter().any(|stiffness| *stiffness > 0.0);
             self.usable = factor.factorise(level, held, &self.contacts);
             self.held.copy_from_slice(held);
         }
@@ -104,69 +98,67 @@ impl System {
     /// Begins a substep: the contacts are those in the factor, and no element is stiffened.
     pub fn reset_update(&mut self) {
         self.update.reset();
+        self.forget_stiffened();
     }
 
-    /// Updates the inverse for the elements that are stiffened at the positions `x`. The contacts
-    /// are to be updated after it.
-    pub fn update_stiffened(
+    /// Finds the elements that are stiffened at the positions `x`. The contacts are to be updated
+    /// after it.
+    pub fn update_stiffened(&mut self, layout: &Layout, elements: &mut Elements, held: &[bool], x: &[Row]) {
+        let Self { warp, stiffened, springs: ContactSprings { springs, .. }, .. } = self;
+        elements.find_stiffened(layout, x, held, stiffened);
+        springs.clear();
+        for element in stiffened.iter() {
+            let along = |(node, gradient)| Term { node, along: warp.turn_back(node, gradient) };
+            springs.push(element.stiffness, element.gradients().map(along));
+        }
+        self.of_elements = springs.len();
+    }
+
+    /// Forgets the stiffened elements. The contacts are to be updated after it.
+    pub fn forget_stiffened(&mut self) {
+        self.springs.springs.clear();
+        self.of_elements = 0;
+    }
+
+    /// Updates the inverse for the contacts as they are at the positions `x`, with these `limits`
+    /// of friction (N).
+    pub fn update_contacts(
         &mut self,
         level: Level,
         layout: &Layout,
-        elements: &mut Elements,
+        (contacts, limits): (&ContactSet, &[f32]),
         held: &[bool],
         x: &[Row],
     ) {
-        let Self { factor: Some(factor), update, warp, stiffened, right, .. } = self else { return };
-        elements.find_stiffened(layout, x, held, stiffened);
-        for element in stiffened.iter_mut() {
-            for (node, g) in element.nodes.iter().zip(&mut element.gradient) {
-                *g = warp.turn_back(*node, *g);
-            }
+        self.springs.springs.truncate(self.of_elements);
+        if !contacts.list().is_empty() || self.has_contacts {
+            let placed = Placed { layout, warp: &self.warp, x, held, in_factor: &self.contacts };
+            self.springs.add(&placed, contacts, limits);
         }
-        dispatch!(level, simd => update.set_stiffened(simd, factor, right, stiffened));
+        self.set_update(level);
     }
 
-    /// Takes the stiffened elements out of the inverse.
-    pub fn forget_stiffened(&mut self) {
-        self.update.forget_stiffened();
+    /// Updates the inverse for the contacts that press at the positions `x`, as if each were as
+    /// stiff in all directions as along its normal.
+    pub fn update_contacts_alike(
+        &mut self,
+        level: Level,
+        layout: &Layout,
+        contacts: &ContactSet,
+        held: &[bool],
+        x: &[Row],
+    ) {
+        self.springs.springs.truncate(self.of_elements);
+        let placed = Placed { layout, warp: &self.warp, x, held, in_factor: &self.contacts };
+        self.springs.add_alike(&placed, contacts);
+        self.set_update(level);
     }
 
-    /// Updates the inverse for the contacts that press at the positions `x`.
-    pub fn update_contacts(&mut self, level: Level, layout: &Layout, contacts: &ContactSet, held: &[bool], x: &[Row]) {
-        let Self { factor: Some(factor), update, pressing, known, right, .. } = self else { return };
-        if contacts.list().is_empty() && known.is_empty() && !update.is_stale() {
+    fn set_update(&mut self, level: Level) {
+        let Self { factor: Some(factor), update, springs: ContactSprings { springs, .. }, right, .. } = self else {
             return;
-        }
-        pressing.fill(0.0);
-        for contact in contacts.list().iter().filter(|contact| !contact.source.is_in_factor()) {
-            let here = contact.site.at(|vertex| layout.value(vertex, |i| position(&x[i])));
-            if contact.height(here) >= 0.0 {
-                continue;
-            }
-            let stiffness = contact.tangent(here);
-            for (vertex, share) in contact.site.shares() {
-                let spread = layout.spread(vertex);
-                let stiffness = spread.unwrap_or(1.0) * stiffness;
-                let is_node = contact.site.is_vertex() && spread.is_none();
-                layout.for_nodes(vertex, share, |i, share| {
-                    if i < layout.free && !held[i] {
-                        // What is between nodes comes after them and adds to them. By weights of
-                        // both signs it is no less than their part of the matrix.
-                        pressing[i] = if is_node { stiffness } else { pressing[i] + share.abs() * stiffness };
-                    }
-                });
-            }
-        }
-        // What remains in `pressing` after this is new, or harder than in the factor.
-        for (i, stiffness) in known.iter_mut() {
-            let pressing = &mut pressing[*i as usize];
-            *stiffness = stiffness.abs().copysign(if *pressing > 0.0 { 1.0 } else { -1.0 });
-            let more = *pressing - stiffness.abs();
-            *pressing = if more > MIN_HARDER * stiffness.abs() { more } else { 0.0 };
-        }
-        let gone = known.iter().filter(|(i, stiffness)| *stiffness < 0.0 && !held[*i as usize]).copied();
-        let new = pressing.iter().enumerate().filter(|(_, k)| **k > 0.0).map(|(i, k)| (i as u32, *k));
-        dispatch!(level, simd => update.set(simd, factor, right, gone.chain(new)));
+        };
+        dispatch!(level, simd => update.set(simd, factor, right, springs));
     }
 
     /// Turns the system with the tissue, nodes at `x`.
@@ -232,6 +224,11 @@ impl System {
         for (row, product) in from.iter_mut().zip(&product) {
             add(row, -(*rotation * *product));
         }
+    }
+
+    /// Norm of the matrix's diagonal without springs, over nodes that tools do not hold (N/m).
+    pub fn norm(&self) -> f32 {
+        self.factor.as_ref().map_or(0.0, |factor| factor.norm)
     }
 
     /// The stiffness of the springs of a node in the matrix: those in the factor, and what the

@@ -61,7 +61,8 @@ impl QuasiNewtonSolver {
         // Elements are as stiff as at rest.
         self.system.forget_stiffened();
         // A body at rest has not needed the contacts that are not in the factor.
-        self.update_contacts();
+        let Self { level, system, layout, touching, held, iterate, .. } = self;
+        system.update_contacts_alike(*level, layout, &touching.contacts, held, &iterate.x);
         let springs = self.springs(body, group);
         if !springs.iter().any(Spring::moves) {
             return;
