@@ -20,6 +20,9 @@ const MIN_SHARE: f32 = 0.05;
 /// there.
 const MIN_DIFFERENCE: f32 = 0.3;
 
+/// Springs that there is room for without allocating.
+const ROOM: usize = 512;
+
 /// Displacements along the surface below this have no direction (m).
 const MIN_OFF: f32 = 1e-9;
 
@@ -35,8 +38,7 @@ pub(super) struct Placed<'a> {
     pub in_factor: &'a [f32],
 }
 
-/// Scratch of a body.
-#[derive(Default)]
+/// Finds the springs of a body's contacts.
 pub(super) struct ContactSprings {
     /// The list.
     pub springs: Springs,
@@ -46,7 +48,7 @@ pub(super) struct ContactSprings {
 
 impl ContactSprings {
     pub fn new(layout: &Layout) -> Self {
-        Self { springs: Springs::default(), of_node: vec![(0, 0); layout.free] }
+        Self { springs: Springs::with_capacity(ROOM), of_node: vec![(0, 0); layout.free] }
     }
 
     /// Adds what the contacts have beyond the factor, with these `limits` of friction (N): first
@@ -148,7 +150,7 @@ impl Placed<'_> {
     }
 
     /// The stiffness of a contact along three directions at right angles: the second derivative of
-    /// its energy.
+    /// its energy, or more.
     fn stiffness(&self, contact: &Contact, limit: f32) -> [(Vec3A, f32); 3] {
         let here = self.point(contact);
         let off = contact.off(here);
@@ -156,8 +158,11 @@ impl Placed<'_> {
         let along = if pull > MIN_OFF { off / pull } else { contact.normal.any_orthonormal_vector() };
         let [normal, first, second] = match contact.push_within(here, limit) {
             None => [0.0; 3],
-            // The limit pulls with the same force wherever the point is.
-            Some(push) if push.across < contact.stiffness => [push.along, 0.0, push.across],
+            // At its limit, friction pulls with the same force wherever the point is along the pull.
+            // A hard contact keeps its secant, which is never too soft.
+            Some(push) if push.across < contact.stiffness && contact.source.is_in_factor() => {
+                [push.along, 0.0, push.across]
+            }
             Some(push) => [push.along, push.across, push.across],
         };
         [(contact.normal, normal), (along, first), (contact.normal.cross(along), second)]

@@ -13,11 +13,14 @@
 
 use super::factor::Factor;
 use super::half_columns::HalfColumns;
-use super::springs::Springs;
+use super::springs::{Springs, Term};
 use fearless_simd::Simd;
 
 /// Greatest number of nodes in the update.
 const MAX_NODES: usize = 128;
+
+/// Greatest number of columns.
+const MAX_COLUMNS: usize = 3 * MAX_NODES;
 
 /// Greatest number of springs in the update.
 const MAX_SPRINGS: usize = 256;
@@ -33,14 +36,17 @@ pub(super) struct LowRankUpdate {
     /// Nodes whose columns are known, by place.
     known: Vec<u32>,
     columns: Vec<HalfColumns>,
-    /// Products of the columns of two places, by pair of places, the greater one first.
-    products: Vec<[[f64; 3]; 3]>,
+    /// Products of each column with all, three columns a place, row by row. Memory is allocated for
+    /// all, and touched as places are used.
+    products: Vec<f64>,
     /// K^-1 + V'V as L D L', by columns: what is below the diagonal of L, and D on it.
     matrix: Vec<f64>,
     /// Scratch: one number a spring.
     shares: Vec<f64>,
-    /// Scratch: three numbers a place.
-    of_places: Vec<[f64; 3]>,
+    /// Scratch: one number a column.
+    of_columns: Vec<f64>,
+    /// Scratch: nodes of springs.
+    nodes: Vec<u32>,
     /// Whether the matrix is that of a sum that is positive definite.
     usable: bool,
 }
@@ -49,15 +55,16 @@ impl LowRankUpdate {
     /// An empty one.
     pub fn new() -> Self {
         Self {
-            springs: Springs::default(),
-            places: Vec::new(),
-            used: Vec::new(),
-            known: Vec::new(),
-            columns: Vec::new(),
-            products: Vec::new(),
-            matrix: Vec::new(),
-            shares: Vec::new(),
-            of_places: Vec::new(),
+            springs: Springs::with_capacity(MAX_SPRINGS),
+            places: Vec::with_capacity(3 * MAX_SPRINGS),
+            used: Vec::with_capacity(MAX_NODES),
+            known: Vec::with_capacity(MAX_NODES),
+            columns: vec![HalfColumns::default(); MAX_NODES],
+            products: vec![0.0; MAX_COLUMNS * MAX_COLUMNS],
+            matrix: vec![0.0; MAX_SPRINGS * MAX_SPRINGS],
+            shares: Vec::with_capacity(MAX_SPRINGS),
+            of_columns: vec![0.0; MAX_COLUMNS],
+            nodes: Vec::with_capacity(MAX_NODES + 12),
             usable: false,
         }
     }
@@ -93,7 +100,7 @@ impl LowRankUpdate {
         if springs.are_like(&self.springs) {
             return;
         }
-        self.springs.clone_from(springs);
+        self.springs.copy_from(springs);
         self.springs.truncate(MAX_SPRINGS);
         self.find_places(simd, factor, scratch);
         self.usable = self.factorise(simd);
@@ -137,7 +144,8 @@ impl LowRankUpdate {
 
     /// Leaves out the first spring that would need more nodes than there may be, and all after it.
     fn keep_springs(&mut self) {
-        let mut nodes: Vec<u32> = Vec::with_capacity(MAX_NODES);
+        let Self { nodes, .. } = self;
+        nodes.clear();
         let mut kept = 0;
         for (_, range) in self.springs.ranges() {
             for term in &self.springs.terms()[range] {
@@ -156,15 +164,15 @@ impl LowRankUpdate {
     /// Solves for the columns of a place, and multiplies them with all others.
     #[inline(always)]
     fn solve<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32], place: usize) {
-        if place == self.columns.len() {
-            self.columns.push(HalfColumns::default());
-        }
         self.columns[place].solve(simd, factor, scratch, self.known[place] as usize);
-        self.products.resize(self.known.len() * (self.known.len() + 1) / 2, [[0.0; 3]; 3]);
         for other in 0..self.known.len() {
-            let (first, second) = (place.max(other), place.min(other));
-            let product = self.columns[first].product_with(simd, &self.columns[second]);
-            self.products[pair(first, second)] = product;
+            let block = self.columns[place].product_with(simd, &self.columns[other]);
+            for (r, row) in block.into_iter().enumerate() {
+                for (c, product) in row.into_iter().enumerate() {
+                    self.products[MAX_COLUMNS * (3 * place + r) + 3 * other + c] = product;
+                    self.products[MAX_COLUMNS * (3 * other + c) + 3 * place + r] = product;
+                }
+            }
         }
     }
 
@@ -172,9 +180,10 @@ impl LowRankUpdate {
     #[inline(always)]
     fn factorise<S: Simd>(&mut self, simd: S) -> bool {
         let n = self.springs.len();
-        self.matrix.clear();
-        self.matrix.resize(n * n, 0.0);
-        self.build();
+        simd.vectorize(
+            #[inline(always)]
+            || self.build(),
+        );
         simd.vectorize(
             #[inline(always)]
             || decompose(&mut self.matrix, n),
@@ -186,31 +195,23 @@ impl LowRankUpdate {
     }
 
     /// K^-1 + V'V, from the diagonal down.
+    #[inline(always)]
     fn build(&mut self) {
-        let n = self.springs.len();
-        let Self { springs, places, known, products, matrix, of_places, used, .. } = self;
-        of_places.resize(known.len(), [0.0; 3]);
-        let terms = springs.terms();
+        let Self { springs, places, known, products, matrix, of_columns, .. } = self;
+        let (n, terms) = (springs.len(), springs.terms());
+        let of_columns = &mut of_columns[..3 * known.len()];
         for (j, (stiffness, range)) in springs.ranges().enumerate() {
-            // V'V of all nodes times this spring's vectors.
-            used.iter().for_each(|place| of_places[*place] = [0.0; 3]);
-            for (term, from) in terms[range.clone()].iter().zip(&places[range]) {
-                for to in used.iter() {
-                    let block = &products[pair(*from.max(to), *from.min(to))];
-                    let sum = &mut of_places[*to];
-                    for (r, sum) in sum.iter_mut().enumerate() {
-                        for (c, along) in term.along.iter().enumerate() {
-                            let product = if from <= to { block[r][c] } else { block[c][r] };
-                            *sum += product * f64::from(*along);
-                        }
-                    }
+            // All columns times this spring's.
+            of_columns.fill(0.0);
+            for (term, place) in terms[range.clone()].iter().zip(&places[range]) {
+                for (c, along) in term.along.iter().enumerate() {
+                    let row = &products[MAX_COLUMNS * (3 * place + c)..];
+                    of_columns.iter_mut().zip(row).for_each(|(sum, product)| *sum += f64::from(*along) * product);
                 }
             }
             let column = &mut matrix[j * n..(j + 1) * n];
             for (number, (_, range)) in column.iter_mut().zip(springs.ranges()).skip(j) {
-                for (term, place) in terms[range.clone()].iter().zip(&places[range]) {
-                    *number += dot(&term.along, &of_places[*place]);
-                }
+                *number = along(&terms[range.clone()], &places[range], of_columns);
             }
             column[j] += 1.0 / f64::from(stiffness);
         }
@@ -222,63 +223,102 @@ impl LowRankUpdate {
         if !self.usable {
             return;
         }
-        let Self { springs, places, used, columns, matrix, shares, of_places, .. } = self;
+        let Self { springs, places, used, known, columns, matrix, shares, of_columns, .. } = self;
         let terms = springs.terms();
         for place in used.iter() {
-            of_places[*place] = columns[*place].product(simd, y);
+            of_columns[3 * place..3 * place + 3].copy_from_slice(&columns[*place].product(simd, y));
         }
         shares.clear();
-        for (_, range) in springs.ranges() {
-            let products = terms[range.clone()].iter().zip(&places[range]);
-            shares.push(products.map(|(term, place)| dot(&term.along, &of_places[*place])).sum());
-        }
+        shares.extend(springs.ranges().map(|(_, range)| along(&terms[range.clone()], &places[range], of_columns)));
         let n = shares.len();
-        for (k, l) in matrix.chunks_exact(n).enumerate() {
+        for (k, l) in matrix.chunks_exact(n).take(n).enumerate() {
             let (solved, below) = shares.split_at_mut(k + 1);
             below.iter_mut().zip(&l[k + 1..]).for_each(|(sum, l)| *sum -= solved[k] * l);
         }
-        for (k, l) in matrix.chunks_exact(n).enumerate().rev() {
+        for (k, l) in matrix.chunks_exact(n).take(n).enumerate().rev() {
             let known: f64 = l[k + 1..].iter().zip(&shares[k + 1..]).map(|(l, share)| l * share).sum();
             shares[k] = shares[k] / l[k] - known;
         }
-        used.iter().for_each(|place| of_places[*place] = [0.0; 3]);
+        of_columns[..3 * known.len()].fill(0.0);
         for (share, (_, range)) in shares.iter().zip(springs.ranges()) {
             for (term, place) in terms[range.clone()].iter().zip(&places[range]) {
-                let sum = &mut of_places[*place];
-                sum.iter_mut().zip(term.along).for_each(|(sum, along)| *sum += share * f64::from(along));
+                let sums = &mut of_columns[3 * place..3 * place + 3];
+                sums.iter_mut().zip(term.along).for_each(|(sum, along)| *sum += share * f64::from(along));
             }
         }
         for place in used.iter() {
-            columns[*place].subtract(of_places[*place], y);
+            columns[*place].subtract(std::array::from_fn(|c| of_columns[3 * place + c]), y);
         }
     }
 }
 
-/// Index of a pair of places, of which the first is not the lesser one.
-fn pair(first: usize, second: usize) -> usize {
-    first * (first + 1) / 2 + second
+/// Sum over a spring's terms of what the columns of their places have, along the spring.
+#[inline(always)]
+fn along(terms: &[Term], places: &[usize], of_columns: &[f64]) -> f64 {
+    let mut sum = 0.0;
+    for (term, place) in terms.iter().zip(places) {
+        let numbers = &of_columns[3 * place..3 * place + 3];
+        for (along, number) in term.along.iter().zip(numbers) {
+            sum += f64::from(*along) * number;
+        }
+    }
+    sum
 }
 
-fn dot(along: &[f32; 3], v: &[f64; 3]) -> f64 {
-    along.iter().zip(v).map(|(a, v)| f64::from(*a) * v).sum()
-}
+/// Columns that [`decompose`] subtracts from as many others at once.
+const BLOCK: usize = 4;
 
 /// L D L' of a symmetric matrix of `n` columns in place, of which only what is not above the
-/// diagonal is read and written.
+/// diagonal is read.
 #[inline(always)]
 fn decompose(matrix: &mut [f64], n: usize) {
-    for j in 0..n {
-        let (before, column) = matrix.split_at_mut(j * n);
-        let column = &mut column[j..n];
-        for before in before.chunks_exact(n).enumerate().map(|(k, before)| &before[k..]) {
-            // D first, then the numbers of L below it.
-            let part = &before[before.len() - column.len()..];
-            let share = before[0] * part[0];
-            column.iter_mut().zip(part).for_each(|(sum, l)| *sum -= share * l);
+    let mut first = 0;
+    while first + BLOCK <= n {
+        let (before, columns) = matrix.split_at_mut(first * n);
+        let mut columns = columns.chunks_exact_mut(n).map(|column| &mut column[first..]);
+        let mut columns: [&mut [f64]; BLOCK] = std::array::from_fn(|_| columns.next().expect("a block of columns"));
+        for four in before.chunks_exact(BLOCK * n).enumerate().map(|(k, four)| (BLOCK * k, four)) {
+            subtract_block(four, n, first, &mut columns);
         }
-        let d = column[0];
-        column[1..].iter_mut().for_each(|l| *l /= d);
+        for j in first..first + BLOCK {
+            finish_column(matrix, n, first, j);
+        }
+        first += BLOCK;
     }
+    (first..n).for_each(|j| finish_column(matrix, n, 0, j));
+}
+
+/// Subtracts what columns of L before a block have in it, from the first row of the block on. The
+/// columns begin with the one of number `four.0`.
+#[inline(always)]
+fn subtract_block(four: (usize, &[f64]), n: usize, first: usize, columns: &mut [&mut [f64]; BLOCK]) {
+    let rows = n - first;
+    let l: [&[f64]; BLOCK] = std::array::from_fn(|k| &four.1[k * n + first..][..rows]);
+    let d: [f64; BLOCK] = std::array::from_fn(|k| four.1[k * n + four.0 + k]);
+    let shares: [[f64; BLOCK]; BLOCK] = std::array::from_fn(|j| std::array::from_fn(|k| d[k] * l[k][j]));
+    let [a, b, c, e] = columns;
+    let (a, b, c, e) = (&mut a[..rows], &mut b[..rows], &mut c[..rows], &mut e[..rows]);
+    for r in 0..rows {
+        let l = [l[0][r], l[1][r], l[2][r], l[3][r]];
+        let sum = |from: f64, s: &[f64; BLOCK]| from - s[0] * l[0] - s[1] * l[1] - s[2] * l[2] - s[3] * l[3];
+        a[r] = sum(a[r], &shares[0]);
+        b[r] = sum(b[r], &shares[1]);
+        c[r] = sum(c[r], &shares[2]);
+        e[r] = sum(e[r], &shares[3]);
+    }
+}
+
+/// Subtracts what the columns of L from `first` on have in column j, and divides it by its D.
+#[inline(always)]
+fn finish_column(matrix: &mut [f64], n: usize, first: usize, j: usize) {
+    let (before, column) = matrix.split_at_mut(j * n);
+    let column = &mut column[j..n];
+    for (k, before) in before.chunks_exact(n).enumerate().skip(first) {
+        let share = before[k] * before[j];
+        column.iter_mut().zip(&before[j..]).for_each(|(sum, l)| *sum -= share * l);
+    }
+    let d = column[0];
+    column[1..].iter_mut().for_each(|l| *l /= d);
 }
 
 #[cfg(test)]
@@ -330,7 +370,7 @@ mod tests {
             supports[nodes[1]] = 25.0 * stiffness;
             nodes[2..].iter().for_each(|i| supports[*i] = stiffness);
             assert!(after.factorise(level, &held, &supports));
-            let mut springs = Springs::default();
+            let mut springs = Springs::with_capacity(0);
             springs.push_alike(24.0 * stiffness, nodes[1] as u32);
             springs.push_alike(stiffness, nodes[2] as u32);
             // Three springs at right angles are one that is alike in all directions.
@@ -358,7 +398,8 @@ mod tests {
             assert!(error < 2e-3 && change > 10.0 * error, "{cells:?}: off by {error}, by {change} without the update");
             // Springs between nodes are not in any factor: the solution has to fulfil its equation.
             supports[nodes[1]] = stiffness;
-            let between = [(1, 0.5), (2, 0.3), (4, 0.2)].map(|(k, share)| Term { node: nodes[k] as u32, along: [share; 3] });
+            let between =
+                [(1, 0.5), (2, 0.3), (4, 0.2)].map(|(k, share)| Term { node: nodes[k] as u32, along: [share; 3] });
             springs.clear();
             springs.push(25.0 * stiffness, between);
             springs.push(stiffness, between[..2].iter().map(|term| Term { along: [0.6, -0.8, 0.1], ..*term }));
@@ -388,7 +429,10 @@ mod tests {
                 product.iter().zip(rights).fold(0.0f32, |most, (a, b)| most.max((*a - b).length()))
             };
             let (error, change) = (off(&product), off(&without));
-            assert!(error < 0.05 && change > 10.0 * error, "{cells:?}: off by {error} N, by {change} N without springs");
+            assert!(
+                error < 0.05 && change > 10.0 * error,
+                "{cells:?}: off by {error} N, by {change} N without springs"
+            );
         }
     }
 }

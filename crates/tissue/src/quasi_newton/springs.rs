@@ -19,7 +19,6 @@ const SAME_STIFFNESS: f32 = 0.25;
 const SAME_DIRECTION: f32 = 0.1;
 
 /// A list of springs.
-#[derive(Clone, Default)]
 pub(super) struct Springs {
     /// Stiffness of each, and the end of its terms; negative where the factor has too much.
     springs: Vec<(f32, usize)>,
@@ -27,6 +26,11 @@ pub(super) struct Springs {
 }
 
 impl Springs {
+    /// Room for `count` springs of some nodes each.
+    pub fn with_capacity(count: usize) -> Self {
+        Self { springs: Vec::with_capacity(count), terms: Vec::with_capacity(3 * count) }
+    }
+
     pub fn clear(&mut self) {
         self.springs.clear();
         self.terms.clear();
@@ -50,6 +54,12 @@ impl Springs {
         for c in 0..3 {
             self.push(stiffness, [Term { node, along: std::array::from_fn(|k| if k == c { 1.0 } else { 0.0 }) }]);
         }
+    }
+
+    /// Takes over another list without allocating.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.springs.clone_from(&other.springs);
+        self.terms.clone_from(&other.terms);
     }
 
     /// Removes all but the first `count`.

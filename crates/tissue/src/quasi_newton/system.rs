@@ -72,13 +72,7 @@ impl System {
 
     /// Factorises again unless the factor is the one for the `held` nodes and the stiffness of
     /// contacts at each vertex (N/m). Returns whether it did.
-    pub fn refresh(
-        &mut self,
-        level: Level,
-        layout: &Layout,
-        held: &[bool],
-        stiffness: impl Fn(usize) -> f32,
-    ) -> bool {
+    pub fn refresh(&mut self, level: Level, layout: &Layout, held: &[bool], stiffness: impl Fn(usize) -> f32) -> bool {
         let Some(factor) = &mut self.factor else { return false };
         let mut stale = !self.usable || *held != self.held[..];
         for (vertex, known) in layout.vertex.iter().zip(&mut self.contacts) {
