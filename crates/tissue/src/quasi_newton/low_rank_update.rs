@@ -275,8 +275,10 @@ fn decompose(matrix: &mut [f64], n: usize) {
     let mut first = 0;
     while first + BLOCK <= n {
         let (before, columns) = matrix.split_at_mut(first * n);
-        let mut columns = columns.chunks_exact_mut(n).map(|column| &mut column[first..]);
-        let mut columns: [&mut [f64]; BLOCK] = std::array::from_fn(|_| columns.next().expect("a block of columns"));
+        let (a, columns) = columns.split_at_mut(n);
+        let (b, columns) = columns.split_at_mut(n);
+        let (c, columns) = columns.split_at_mut(n);
+        let mut columns = [a, b, c, &mut columns[..n]].map(|column| &mut column[first..]);
         for four in before.chunks_exact(BLOCK * n).enumerate().map(|(k, four)| (BLOCK * k, four)) {
             subtract_block(four, n, first, &mut columns);
         }
