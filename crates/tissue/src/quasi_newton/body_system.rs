@@ -90,7 +90,7 @@ pub(super) struct Progress {
     pub longest: f32,
     /// Largest coordinate of the deviation from the body's free motion (m).
     pub gone: f32,
-    /// Norm of a gradient that cannot be told from zero (N).
+    /// Mean motion of a node by forces that cannot be told from zero (m).
     pub rounding: f32,
 }
 
@@ -392,10 +392,9 @@ impl QuasiNewtonSolver {
         dispatch!(self.level, _simd => max_coordinate(&self.iterate.x[..self.layout.free]))
     }
 
-    /// Norm of the gradient (N).
-    pub fn gradient_norm(&self) -> f32 {
-        let gradient = &self.iterate.gradient;
-        dispatch!(self.level, simd => dot_rows(simd, gradient, gradient)).sqrt()
+    /// Whether the gradient cannot be told from zero: no more than positions that are rounded.
+    pub fn is_rounding(&self) -> bool {
+        self.system.mean_motion(self.level, &self.iterate.gradient) <= self.progress.rounding
     }
 
     /// Sum of the gradient over the nodes (N).

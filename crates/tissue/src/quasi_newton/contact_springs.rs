@@ -158,8 +158,8 @@ impl Placed<'_> {
         let along = if pull > MIN_OFF { off / pull } else { contact.normal.any_orthonormal_vector() };
         let [normal, first, second] = match contact.push_within(here, limit) {
             None => [0.0; 3],
-            // At its limit, friction pulls with the same force wherever the point is along the pull.
-            // A hard contact keeps its secant, which is never too soft.
+            // At its limit, friction pulls with the same force however far the point is. A hard
+            // contact keeps its secant, which is never too soft.
             Some(push) if push.across < contact.stiffness && contact.source.is_in_factor() => {
                 [push.along, 0.0, push.across]
             }

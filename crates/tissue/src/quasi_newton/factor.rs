@@ -4,6 +4,7 @@
 use super::tiles::Tiles;
 use crate::Body;
 use crate::assembly::{Stiffness, blocks, shape_gradients, tangent};
+use crate::lanes::Row;
 use fearless_simd::{Level, Simd};
 use glam::{DMat3, DVec3, Vec3A};
 use std::ops::Range;
@@ -26,8 +27,8 @@ pub(super) struct Factor {
     added: Vec<f32>,
     /// Stiffness by which tools hold nodes or supports carry them (N/m).
     pub holding: Vec<f32>,
-    /// Norm of the diagonal over nodes that tools do not hold, without `holding` (N/m).
-    pub norm: f32,
+    /// 1 over the diagonal without `holding` (m/N), by node; 0 where tools hold one.
+    pub compliance: Vec<Row>,
     cholesky: Cholesky<f32>,
     tiles: Tiles,
 }
@@ -60,7 +61,7 @@ impl Factor {
             scale: vec![0.0; 3 * rank.len()],
             added: vec![0.0; rank.len()],
             holding: vec![0.0; rank.len()],
-            norm: 0.0,
+            compliance: vec![[0.0; 4]; rank.len()],
             order: cholesky.order().iter().map(|i| rest.free()[*i as usize] as u32).collect(),
             rank,
             rest,
@@ -79,8 +80,7 @@ impl Factor {
     /// Factorises with the `held` nodes held by a large stiffness and the others by `supports`
     /// (N/m). False if the matrix is not positive definite.
     pub fn factorise(&mut self, level: Level, held: &[bool], supports: &[f32]) -> bool {
-        let Self { rank, rest, scale, added, holding, norm, cholesky, .. } = self;
-        let mut squares = 0.0;
+        let Self { rank, rest, scale, added, holding, compliance, cholesky, .. } = self;
         for (i, rank) in rank.iter().enumerate() {
             let node = *rank as usize;
             let own = rest.matrix().diagonal(i);
@@ -89,10 +89,9 @@ impl Factor {
             for c in 0..3 {
                 let diagonal = own.col(c)[c] as f32 + added[node];
                 scale[3 * node + c] = 1.0 / (diagonal + holding[node]).sqrt();
-                squares += if held[node] { 0.0 } else { f64::from(diagonal * diagonal) };
+                compliance[node][c] = if held[node] { 0.0 } else { 1.0 / diagonal };
             }
         }
-        *norm = squares.sqrt() as f32;
         let scaled = rest.matrix().blocks().map(|(row, column, block)| {
             let [rows, columns] = [row, column].map(|i| 3 * rank[i as usize] as usize);
             let number = |r: usize, c: usize| match row == column && r == c {

@@ -1,4 +1,5 @@
-//! Columns of a factor's forward half, L^-1 u, for the three u that are 1 at a coordinate of a node.
+//! Columns of a factor's forward half, L^-1 u, for the three u that are 1 at a coordinate of a
+//! node.
 //!
 //! The forward half of a solve carries a number of a node to the nodes that are eliminated after it
 //! along the tree of supernodes: from its own supernode up to the root. This chain is a small part

@@ -15,9 +15,9 @@ const MAX_FRICTION_ROUNDS: usize = 4;
 /// most this many times the one that ends a substep: rounding, not a failed search.
 const MAX_ROUNDING_FACTOR: f32 = 100.0;
 
-/// Positions are rounded to `f32::EPSILON` of the body's extent. A gradient whose norm is this share
-/// of what the diagonal of the matrix makes of that is rounding: in lifts of whole organs it stays
-/// at 0.1 to 0.2 of it, however many steps follow.
+/// Positions are rounded to `f32::EPSILON` of the body's extent. Forces that would move nodes by
+/// this share of it in the mean are rounding: in lifts of whole organs they stay at 0.1 to 0.13 of
+/// it, however many steps follow.
 const ROUNDING_SHARE: f32 = 0.25;
 
 impl IslandSystem<'_> {
@@ -41,6 +41,7 @@ impl IslandSystem<'_> {
         let mut stepped = behind && self.move_constraints();
         let settings = self.slots[0].solver.settings;
         let (absolute, relative) = (self.tolerance(), settings.relative as f32);
+        let (wide, wide_relative) = (MAX_ROUNDING_FACTOR * absolute, MAX_ROUNDING_FACTOR * relative);
         if alone {
             self.rest_alone(still);
         }
@@ -51,7 +52,7 @@ impl IslandSystem<'_> {
                 // Nothing moves, and nothing has moved.
                 return true;
             }
-            let is_rounding = iteration > 0 && self.is_rounding();
+            let is_rounding = iteration > usize::from(behind) && self.is_rounding(wide, wide_relative);
             if !is_rounding {
                 self.find_direction();
                 self.count_iteration();
@@ -77,7 +78,6 @@ impl IslandSystem<'_> {
             } else if !alone {
                 self.fall_asleep(absolute, relative);
             }
-            let (wide, wide_relative) = (MAX_ROUNDING_FACTOR * absolute, MAX_ROUNDING_FACTOR * relative);
             match self.search() {
                 Found::Step => stepped = true,
                 Found::Nothing if stepped && !alone && self.wake(absolute, relative) => {}
@@ -146,13 +146,13 @@ impl IslandSystem<'_> {
     /// Measures which gradients are rounding.
     fn measure_rounding(&mut self) {
         for body in self.all() {
-            body.progress.rounding = ROUNDING_SHARE * f32::EPSILON * body.extent() * body.system.norm();
+            body.progress.rounding = ROUNDING_SHARE * f32::EPSILON * body.extent();
         }
     }
 
-    /// Whether the gradients of all bodies that take part cannot be told from zero.
-    fn is_rounding(&mut self) -> bool {
-        self.active().all(|body| body.gradient_norm() <= body.progress.rounding)
+    /// Whether the forces on all bodies that take part are rounding, after a step that was short.
+    fn is_rounding(&mut self, absolute: f32, relative: f32) -> bool {
+        self.is_solved(absolute, relative) && self.active().all(|body| body.is_rounding())
     }
 
     /// Lets a single body stay where it is, if it is at rest.

@@ -220,9 +220,20 @@ impl System {
         }
     }
 
-    /// Norm of the matrix's diagonal without springs, over nodes that tools do not hold (N/m).
-    pub fn norm(&self) -> f32 {
-        self.factor.as_ref().map_or(0.0, |factor| factor.norm)
+    /// Root mean square of what the forces `gradient` (N) would move each node by if no other did
+    /// (m), without springs; nodes that tools hold do not move.
+    pub fn mean_motion(&self, level: Level, gradient: &[Row]) -> f32 {
+        let Some(factor) = &self.factor else { return 0.0 };
+        let sum = dispatch!(level, _simd => {
+            let mut sums = [0.0f32; 4];
+            for (force, compliance) in gradient.iter().zip(&factor.compliance) {
+                for c in 0..4 {
+                    sums[c] += (force[c] * compliance[c]).powi(2);
+                }
+            }
+            sums[0] + sums[1] + sums[2]
+        });
+        (sum / (3 * factor.compliance.len()) as f32).sqrt()
     }
 
     /// The stiffness of the springs of a node in the matrix: those in the factor, and what the
