@@ -11,6 +11,7 @@
 //! until the factor changes, and stay valid however the tissue turns. Springs that come, go, turn
 //! or harden need no other solve.
 
+use super::dense::decompose;
 use super::factor::Factor;
 use super::half_columns::HalfColumns;
 use super::springs::{Springs, Term};
@@ -263,64 +264,6 @@ fn along(terms: &[Term], places: &[usize], of_columns: &[f64]) -> f64 {
         }
     }
     sum
-}
-
-/// Columns that [`decompose`] subtracts from as many others at once.
-const BLOCK: usize = 4;
-
-/// L D L' of a symmetric matrix of `n` columns in place, of which only what is not above the
-/// diagonal is read.
-#[inline(always)]
-fn decompose(matrix: &mut [f64], n: usize) {
-    let mut first = 0;
-    while first + BLOCK <= n {
-        let (before, columns) = matrix.split_at_mut(first * n);
-        let (a, columns) = columns.split_at_mut(n);
-        let (b, columns) = columns.split_at_mut(n);
-        let (c, columns) = columns.split_at_mut(n);
-        let mut columns = [a, b, c, &mut columns[..n]].map(|column| &mut column[first..]);
-        for four in before.chunks_exact(BLOCK * n).enumerate().map(|(k, four)| (BLOCK * k, four)) {
-            subtract_block(four, n, first, &mut columns);
-        }
-        for j in first..first + BLOCK {
-            finish_column(matrix, n, first, j);
-        }
-        first += BLOCK;
-    }
-    (first..n).for_each(|j| finish_column(matrix, n, 0, j));
-}
-
-/// Subtracts what columns of L before a block have in it, from the first row of the block on. The
-/// columns begin with the one of number `four.0`.
-#[inline(always)]
-fn subtract_block(four: (usize, &[f64]), n: usize, first: usize, columns: &mut [&mut [f64]; BLOCK]) {
-    let rows = n - first;
-    let l: [&[f64]; BLOCK] = std::array::from_fn(|k| &four.1[k * n + first..][..rows]);
-    let d: [f64; BLOCK] = std::array::from_fn(|k| four.1[k * n + four.0 + k]);
-    let shares: [[f64; BLOCK]; BLOCK] = std::array::from_fn(|j| std::array::from_fn(|k| d[k] * l[k][j]));
-    let [a, b, c, e] = columns;
-    let (a, b, c, e) = (&mut a[..rows], &mut b[..rows], &mut c[..rows], &mut e[..rows]);
-    for r in 0..rows {
-        let l = [l[0][r], l[1][r], l[2][r], l[3][r]];
-        let sum = |from: f64, s: &[f64; BLOCK]| from - s[0] * l[0] - s[1] * l[1] - s[2] * l[2] - s[3] * l[3];
-        a[r] = sum(a[r], &shares[0]);
-        b[r] = sum(b[r], &shares[1]);
-        c[r] = sum(c[r], &shares[2]);
-        e[r] = sum(e[r], &shares[3]);
-    }
-}
-
-/// Subtracts what the columns of L from `first` on have in column j, and divides it by its D.
-#[inline(always)]
-fn finish_column(matrix: &mut [f64], n: usize, first: usize, j: usize) {
-    let (before, column) = matrix.split_at_mut(j * n);
-    let column = &mut column[j..n];
-    for (k, before) in before.chunks_exact(n).enumerate().skip(first) {
-        let share = before[k] * before[j];
-        column.iter_mut().zip(&before[j..]).for_each(|(sum, l)| *sum -= share * l);
-    }
-    let d = column[0];
-    column[1..].iter_mut().for_each(|l| *l /= d);
 }
 
 #[cfg(test)]

@@ -21,6 +21,7 @@ mod body_system;
 mod coarse;
 mod contact_springs;
 mod dashpots;
+mod dense;
 mod elements;
 mod factor;
 mod half_columns;
