@@ -186,7 +186,7 @@ fn struck_block() {
         vec![at(DVec3::new(2e-3, 0.0, -11e-3) * t), at(DVec3::new(8e-3, 0.0, -3e-3) * t)]
     };
     let found = hashes(&model, &state, 24, &tools, &[]);
-    check("struck block", found, [0x581fa5a47dbf8647, 0x3c20022facd7e2f5, 0xc8346ceee9b40c32]);
+    check("struck block", found, [0x430f3af80999256a, 0x3c20022facd7e2f5, 0xc8346ceee9b40c32]);
 }
 
 /// Elements pressed almost flat, thrown inwards and hit: it overstretches.
@@ -208,7 +208,7 @@ fn flat_elements() {
     }
     let tools = |k: usize| vec![at(DVec3::new(0.0, 0.0, -9e-3) * bump(k, 6))];
     let found = hashes(&model, &state, 12, &tools, &[]);
-    check("flat elements", found, [0x9202de0eb2cba4a3, 0x2cb97c27f08a2397, 0xf5a74bf1cbfeb030]);
+    check("flat elements", found, [0x9629d1d0e433ddf8, 0x2cb97c27f08a2397, 0xf5a74bf1cbfeb030]);
 }
 
 /// A spring of negative stiffness: the matrix has no Cholesky factor, and sweeps take over in the

@@ -20,6 +20,9 @@ const MIN_SHARE: f32 = 0.05;
 /// there.
 const MIN_DIFFERENCE: f32 = 0.3;
 
+/// Greatest number of springs with those of sliding nodes.
+const MAX_SLIDING: usize = 384;
+
 /// Springs that there is room for without allocating.
 const ROOM: usize = 512;
 
@@ -52,7 +55,8 @@ impl ContactSprings {
     }
 
     /// Adds what the contacts have beyond the factor, with these `limits` of friction (N): first
-    /// what comes to it, then what it has too much.
+    /// what comes to it, then what it has too much. Where a grasp slips that holds so many nodes
+    /// that a matrix of their springs would cost more than it saves, they stay as in the factor.
     pub fn add(&mut self, at: &Placed<'_>, contacts: &ContactSet, limits: &[f32]) {
         let list = contacts.list();
         self.of_node.fill((0, 0));
@@ -72,15 +76,27 @@ impl ContactSprings {
                 }
             }
         }
+        self.add_differences(at, (list, limits), |more| more > 0.0);
+        let count = self.springs.len();
+        self.add_differences(at, (list, limits), |more| more < 0.0);
+        if self.springs.len() > MAX_SLIDING {
+            self.springs.truncate(count);
+        }
+    }
+
+    /// Adds what nodes have beyond the factor's stiffness, or less, where `kept` says so; and takes
+    /// all of that away, with the first, where not one contact of the node alone acts on it.
+    fn add_differences(&mut self, at: &Placed<'_>, (list, limits): (&[Contact], &[f32]), kept: impl Fn(f32) -> bool) {
         let known = at.in_factor.iter().zip(&self.of_node).enumerate().filter(|(_, (known, _))| **known > 0.0);
         for (node, (known, (count, place))) in known.filter(|(node, _)| !at.held[*node]) {
             let contact = (*count == 1).then(|| (&list[*place as usize], limits[*place as usize]));
             match contact.filter(|(contact, _)| at.node_of(contact).is_some()) {
-                None => self.springs.push_alike(-known, node as u32),
+                None if kept(1.0) => self.springs.push_alike(-known, node as u32),
+                None => {}
                 Some((contact, limit)) => {
                     for (direction, stiffness) in at.stiffness(contact, limit) {
                         let more = stiffness - known;
-                        if more.abs() > MIN_DIFFERENCE * known {
+                        if kept(more) && more.abs() > MIN_DIFFERENCE * known {
                             at.push(&mut self.springs, contact, direction, more);
                         }
                     }

@@ -94,15 +94,15 @@ impl LowRankUpdate {
     }
 
     /// Sets the springs: first those that are added, then those that are taken away, which leave
-    /// something of what the factor has. Springs beyond the greatest numbers are left out.
+    /// something of what the factor has. Springs beyond the greatest numbers are left out, and out
+    /// of the list.
     #[inline(always)]
-    pub fn set<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32], springs: &Springs) {
-        // The springs that were left out are not compared: there are seldom any.
+    pub fn set<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32], springs: &mut Springs) {
+        self.leave_out(springs);
         if springs.are_like(&self.springs) {
             return;
         }
         self.springs.copy_from(springs);
-        self.springs.truncate(MAX_SPRINGS);
         self.find_places(simd, factor, scratch);
         self.usable = self.factorise(simd);
     }
@@ -110,7 +110,6 @@ impl LowRankUpdate {
     /// Finds the places of all terms, and solves for the columns of nodes that are not known.
     #[inline(always)]
     fn find_places<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32]) {
-        self.keep_springs();
         let mut unused = 0;
         self.places.clear();
         self.used.clear();
@@ -143,13 +142,15 @@ impl LowRankUpdate {
         }
     }
 
-    /// Leaves out the first spring that would need more nodes than there may be, and all after it.
-    fn keep_springs(&mut self) {
+    /// Leaves out springs beyond the greatest number, and the first that would need more nodes than
+    /// there may be with all after it.
+    fn leave_out(&mut self, springs: &mut Springs) {
+        springs.truncate(MAX_SPRINGS);
         let Self { nodes, .. } = self;
         nodes.clear();
         let mut kept = 0;
-        for (_, range) in self.springs.ranges() {
-            for term in &self.springs.terms()[range] {
+        for (_, range) in springs.ranges() {
+            for term in &springs.terms()[range] {
                 if !nodes.contains(&term.node) {
                     nodes.push(term.node);
                 }
@@ -159,7 +160,7 @@ impl LowRankUpdate {
             }
             kept += 1;
         }
-        self.springs.truncate(kept);
+        springs.truncate(kept);
     }
 
     /// Solves for the columns of a place, and multiplies them with all others.
@@ -328,7 +329,7 @@ mod tests {
             let mut scratch = vec![0.0; x.len()];
             let mut update = LowRankUpdate::new();
             dispatch!(level, simd => {
-                update.set(simd, &mut before, &mut scratch, &springs);
+                update.set(simd, &mut before, &mut scratch, &mut springs);
                 before.forward(simd, &mut x, true);
                 update.apply(simd, &mut x);
                 before.backward(simd, &mut x, true);
@@ -351,7 +352,7 @@ mod tests {
             springs.push(-stiffness, [Term { node: nodes[0] as u32, along: [0.0, 0.6, 0.8] }]);
             let mut x = [&right[..], &[0.0; 16]].concat();
             dispatch!(level, simd => {
-                update.set(simd, &mut before, &mut scratch, &springs);
+                update.set(simd, &mut before, &mut scratch, &mut springs);
                 before.forward(simd, &mut x, true);
                 update.apply(simd, &mut x);
                 before.backward(simd, &mut x, true);
