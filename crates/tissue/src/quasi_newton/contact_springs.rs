@@ -20,7 +20,7 @@ const MIN_SHARE: f32 = 0.05;
 /// there.
 const MIN_DIFFERENCE: f32 = 0.3;
 
-/// Greatest number of springs with those of sliding nodes.
+/// Greatest number of springs up to which those of sliding nodes take part.
 const MAX_SLIDING: usize = 384;
 
 /// Springs that there is room for without allocating.
@@ -54,9 +54,9 @@ impl ContactSprings {
         Self { springs: Springs::with_capacity(ROOM), of_node: vec![(0, 0); layout.free] }
     }
 
-    /// Adds what the contacts have beyond the factor, with these `limits` of friction (N): first
-    /// what comes to it, then what it has too much. Where a grasp slips that holds so many nodes
-    /// that a matrix of their springs would cost more than it saves, they stay as in the factor.
+    /// Adds the difference between the contacts, with these `limits` of friction (N), and the
+    /// factor. Where a grasp of very many nodes slips, a matrix of their springs would cost more
+    /// than it saves: they stay as in the factor.
     pub fn add(&mut self, at: &Placed<'_>, contacts: &ContactSet, limits: &[f32]) {
         let list = contacts.list();
         self.of_node.fill((0, 0));
@@ -76,27 +76,28 @@ impl ContactSprings {
                 }
             }
         }
-        self.add_differences(at, (list, limits), |more| more > 0.0);
+        self.add_differences(at, (list, limits), false);
         let count = self.springs.len();
-        self.add_differences(at, (list, limits), |more| more < 0.0);
+        self.add_differences(at, (list, limits), true);
         if self.springs.len() > MAX_SLIDING {
             self.springs.truncate(count);
         }
     }
 
-    /// Adds what nodes have beyond the factor's stiffness, or less, where `kept` says so; and takes
-    /// all of that away, with the first, where not one contact of the node alone acts on it.
-    fn add_differences(&mut self, at: &Placed<'_>, (list, limits): (&[Contact], &[f32]), kept: impl Fn(f32) -> bool) {
+    /// Adds the differences at nodes that the factor has contacts of. Where exactly one contact acts
+    /// on the node itself, they are those that are `softer`, or all others. Elsewhere the factor's
+    /// stiffness is taken away, together with those that are not softer.
+    fn add_differences(&mut self, at: &Placed<'_>, (list, limits): (&[Contact], &[f32]), softer: bool) {
         let known = at.in_factor.iter().zip(&self.of_node).enumerate().filter(|(_, (known, _))| **known > 0.0);
         for (node, (known, (count, place))) in known.filter(|(node, _)| !at.held[*node]) {
             let contact = (*count == 1).then(|| (&list[*place as usize], limits[*place as usize]));
             match contact.filter(|(contact, _)| at.node_of(contact).is_some()) {
-                None if kept(1.0) => self.springs.push_alike(-known, node as u32),
-                None => {}
+                None if softer => {}
+                None => self.springs.push_alike(-known, node as u32),
                 Some((contact, limit)) => {
                     for (direction, stiffness) in at.stiffness(contact, limit) {
                         let more = stiffness - known;
-                        if kept(more) && more.abs() > MIN_DIFFERENCE * known {
+                        if (more < 0.0) == softer && more.abs() > MIN_DIFFERENCE * known {
                             at.push(&mut self.springs, contact, direction, more);
                         }
                     }

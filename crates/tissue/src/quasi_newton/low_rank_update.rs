@@ -93,12 +93,12 @@ impl LowRankUpdate {
         springs.map(|(stiffness, _)| stiffness).sum::<f32>() / 3.0
     }
 
-    /// Sets the springs: first those that are added, then those that are taken away, which leave
-    /// something of what the factor has. Springs beyond the greatest numbers are left out, and out
-    /// of the list.
+    /// Sets the springs. Those that are added come first. Those that are taken away follow; they are
+    /// no stiffer than what the factor has there. Springs beyond the limits are removed from the
+    /// list.
     #[inline(always)]
     pub fn set<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32], springs: &mut Springs) {
-        self.leave_out(springs);
+        self.limit(springs);
         if springs.are_like(&self.springs) {
             return;
         }
@@ -142,9 +142,9 @@ impl LowRankUpdate {
         }
     }
 
-    /// Leaves out springs beyond the greatest number, and the first that would need more nodes than
-    /// there may be with all after it.
-    fn leave_out(&mut self, springs: &mut Springs) {
+    /// Removes springs beyond the greatest number of springs, and those beyond the greatest number of
+    /// nodes.
+    fn limit(&mut self, springs: &mut Springs) {
         springs.truncate(MAX_SPRINGS);
         let Self { nodes, .. } = self;
         nodes.clear();
@@ -254,7 +254,7 @@ impl LowRankUpdate {
     }
 }
 
-/// Sum over a spring's terms of what the columns of their places have, along the spring.
+/// Product of a spring's vectors and a vector of one number for each column.
 #[inline(always)]
 fn along(terms: &[Term], places: &[usize], of_columns: &[f64]) -> f64 {
     let mut sum = 0.0;

@@ -12,7 +12,7 @@ use glam::Vec3A;
 const REACH_MARGIN: f32 = 1e-3;
 
 /// The matrix stays the same if at most so many vertices more or fewer touch, and an eighth of
-/// them: as many as two jaws touch. The low-rank update has room for twice as many.
+/// them: as many as two jaws touch. The low-rank update has room for more.
 const MAX_CHANGED_CONTACTS: usize = 24;
 
 impl ContactSet {
