@@ -84,9 +84,9 @@ impl ContactSprings {
         }
     }
 
-    /// Adds the differences at nodes that the factor has contacts of. Where exactly one contact acts
-    /// on the node itself, they are those that are `softer`, or all others. Elsewhere the factor's
-    /// stiffness is taken away, together with those that are not softer.
+    /// Adds the differences at nodes that the factor has contacts of. Where exactly one contact
+    /// acts on the node itself, they are those that are `softer`, or all others. Elsewhere the
+    /// factor's stiffness is taken away, together with those that are not softer.
     fn add_differences(&mut self, at: &Placed<'_>, (list, limits): (&[Contact], &[f32]), softer: bool) {
         let known = at.in_factor.iter().zip(&self.of_node).enumerate().filter(|(_, (known, _))| **known > 0.0);
         for (node, (known, (count, place))) in known.filter(|(node, _)| !at.held[*node]) {

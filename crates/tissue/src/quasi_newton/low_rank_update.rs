@@ -93,9 +93,9 @@ impl LowRankUpdate {
         springs.map(|(stiffness, _)| stiffness).sum::<f32>() / 3.0
     }
 
-    /// Sets the springs. Those that are added come first. Those that are taken away follow; they are
-    /// no stiffer than what the factor has there. Springs beyond the limits are removed from the
-    /// list.
+    /// Sets the springs. Those that are added come first. Those that are taken away follow; they
+    /// are no stiffer than what the factor has there. Springs beyond the limits are removed from
+    /// the list.
     #[inline(always)]
     pub fn set<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32], springs: &mut Springs) {
         self.limit(springs);
@@ -142,8 +142,8 @@ impl LowRankUpdate {
         }
     }
 
-    /// Removes springs beyond the greatest number of springs, and those beyond the greatest number of
-    /// nodes.
+    /// Removes springs beyond the greatest number of springs, and those beyond the greatest number
+    /// of nodes.
     fn limit(&mut self, springs: &mut Springs) {
         springs.truncate(MAX_SPRINGS);
         let Self { nodes, .. } = self;

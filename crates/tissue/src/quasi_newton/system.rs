@@ -220,8 +220,9 @@ impl System {
         }
     }
 
-    /// Root mean square over the nodes of the distance (m) that the forces `gradient` (N) would move
-    /// each of them if all others stayed. Springs do not count, and nodes that tools hold stay.
+    /// Root mean square over the nodes of the distance (m) that the forces `gradient` (N) would
+    /// move each of them if all others stayed. Springs do not count, and nodes that tools hold
+    /// stay.
     pub fn mean_motion(&self, level: Level, gradient: &[Row]) -> f32 {
         let Some(factor) = &self.factor else { return 0.0 };
         let sum = dispatch!(level, _simd => {
