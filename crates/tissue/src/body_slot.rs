@@ -3,7 +3,7 @@
 
 use crate::contact::{ContactSet, Members, Pairs, Reaction, ToolGroup};
 use crate::frame::Frame;
-use crate::report::Measured;
+use crate::shape::ShapeMeter;
 use crate::state::BodyState;
 use crate::untangle::Untangler;
 use crate::{Body, StepReport, ToolForce};
@@ -116,7 +116,7 @@ pub(crate) struct BodySlot<S> {
     pub island: usize,
     pub reaction: Reaction,
     pub untangler: Untangler,
-    pub measured: Measured,
+    pub meter: ShapeMeter,
 }
 
 impl<S: Solver> BodySlot<S> {
@@ -130,7 +130,7 @@ impl<S: Solver> BodySlot<S> {
             island: index,
             reaction: Reaction::new(body),
             untangler: Untangler::new(&rest),
-            measured: Measured::new(),
+            meter: ShapeMeter::new(body),
             before: rest.clone(),
             state: rest,
         }
@@ -153,8 +153,8 @@ impl<S: Solver> BodySlot<S> {
 
     /// Measures the body at the end of a frame: speeds, volumes, and what it does to the tools.
     pub fn measure(&mut self, frame: &Frame<'_>) {
-        let Self { index, body, solver, state, report, reaction, measured, .. } = self;
-        report.measure(*index, body, state, measured);
+        let Self { index, body, solver, state, report, reaction, meter, .. } = self;
+        report.measure(*index, body, state, meter);
         match solver.held_forces() {
             Some(forces) => reaction.set(forces),
             None => reaction.take(&frame.of(*index), body, state, solver.contacts().is_none()),

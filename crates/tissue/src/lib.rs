@@ -73,6 +73,7 @@ mod quasi_newton;
 mod registers;
 mod report;
 mod settings;
+mod shape;
 mod solver_set;
 mod state;
 mod stepper;

@@ -1,20 +1,11 @@
 //! The report of a frame: speeds, volumes, and the events that end a run.
 
 use crate::Body;
+use crate::shape::{STRETCH_LIMIT, Shape, ShapeMeter};
 use crate::state::BodyState;
-use crate::threads::in_parts;
-use glam::{DVec3, Vec3A};
-use std::ops::Range;
 
 /// Speed at which a node has diverged (m/s): the paper's particle velocity limit.
 pub const SPEED_LIMIT: f64 = 20.0;
-
-/// An edge of more than this many rest lengths has diverged.
-const STRETCH_LIMIT: f32 = 10.0;
-
-/// Elements or nodes that are worth a thread of their own, and the most parts of them.
-const MIN_PART: usize = 6000;
-const MAX_PARTS: usize = 8;
 
 /// Why a run is over.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,108 +87,6 @@ impl Default for StepReport {
     }
 }
 
-/// What is measured of a body's shape.
-#[derive(Clone, Copy)]
-struct Shape {
-    /// Whether all positions are numbers; nothing else is measured if not.
-    finite: bool,
-    inverted: usize,
-    min_volume_ratio: f64,
-    /// Whether an edge is too long.
-    stretched: bool,
-}
-
-/// The shape of a body, and where it was then: most bodies have not moved since the last frame.
-pub(crate) struct Measured {
-    x: Vec<Vec3A>,
-    /// Of its lattice, if it has one.
-    nodes: Vec<DVec3>,
-    shape: Option<Shape>,
-}
-
-impl Measured {
-    /// Nothing yet.
-    pub fn new() -> Self {
-        Self { x: Vec::new(), nodes: Vec::new(), shape: None }
-    }
-
-    /// The shape of the body.
-    fn shape(&mut self, body: &Body, state: &BodyState) -> Shape {
-        let nodes = state.lattice.as_ref().map_or(&[][..], |lattice| &lattice.positions);
-        if let Some(shape) = self.shape.filter(|_| self.x == state.x && self.nodes == nodes) {
-            return shape;
-        }
-        let shape = Shape::of(body, state);
-        self.x.clone_from(&state.x);
-        self.nodes.clear();
-        self.nodes.extend_from_slice(nodes);
-        self.shape = Some(shape);
-        shape
-    }
-}
-
-impl Shape {
-    /// The shape of nothing.
-    const NONE: Self = Self { finite: true, inverted: 0, min_volume_ratio: f64::INFINITY, stretched: false };
-
-    fn of(body: &Body, state: &BodyState) -> Self {
-        if !state.x.iter().all(|p| p.is_finite()) {
-            return Self { finite: false, ..Self::NONE };
-        }
-        let elements = if let (Some(embedding), Some(lattice)) = (&body.lattice, &state.lattice) {
-            // Tetrahedra in a lattice bear nothing; its cells do.
-            embedding.body.volume_ratios(&lattice.positions).fold(Self::NONE, Self::with_ratio)
-        } else {
-            sum_of_parts(body.tets.len(), |range| {
-                let elements = body.tets[range.clone()].iter().zip(&body.volumes[range]);
-                elements.fold(Self::NONE, |shape, (tet, rest)| {
-                    let [a, b, c, d] = tet.map(|i| state.x[i as usize]);
-                    shape.with_ratio(f64::from((b - a).cross(c - a).dot(d - a)) / 6.0 / rest)
-                })
-            })
-        };
-        let edges = sum_of_parts(body.len(), |mut range| {
-            let stretched = range.any(|i| {
-                let too_long = |length: f32, j: u32| {
-                    (state.x[j as usize] - state.x[i]).length_squared() > (STRETCH_LIMIT * length).powi(2)
-                };
-                // Every edge appears at both its ends.
-                body.edges_of(i).iter().any(|e| e.to as usize > i && too_long(e.length, e.to))
-            });
-            Self { stretched, ..Self::NONE }
-        });
-        elements.with(edges)
-    }
-
-    /// The same with an element of that volume ratio.
-    fn with_ratio(self, ratio: f64) -> Self {
-        let inverted = self.inverted + usize::from(ratio <= 0.0);
-        Self { inverted, min_volume_ratio: self.min_volume_ratio.min(ratio), ..self }
-    }
-
-    /// Both.
-    fn with(self, other: Self) -> Self {
-        Self {
-            finite: self.finite && other.finite,
-            inverted: self.inverted + other.inverted,
-            min_volume_ratio: self.min_volume_ratio.min(other.min_volume_ratio),
-            stretched: self.stretched || other.stretched,
-        }
-    }
-}
-
-/// The shape of `count` things, part by part on the threads of the pool that calls.
-fn sum_of_parts(count: usize, of: impl Fn(Range<usize>) -> Shape + Send + Sync) -> Shape {
-    let mut parts = [Shape::NONE; MAX_PARTS];
-    let used = (count / MIN_PART).clamp(1, MAX_PARTS);
-    in_parts(&mut parts[..used], 1, |first, parts| {
-        for (k, part) in (first..).zip(parts) {
-            *part = of(count * k / used..count * (k + 1) / used);
-        }
-    });
-    parts.into_iter().fold(Shape::NONE, Shape::with)
-}
-
 impl StepReport {
     /// The sum of both.
     pub(crate) fn with(self, other: &Self) -> Self {
@@ -217,9 +106,9 @@ impl StepReport {
     }
 
     /// Adds the measures of a body at the end of the frame: speed, volumes, and the events that end
-    /// a run. `last` keeps the shape for a body that does not move.
-    pub(crate) fn measure(&mut self, index: usize, body: &Body, state: &BodyState, last: &mut Measured) {
-        let Shape { finite, inverted, min_volume_ratio, stretched } = last.shape(body, state);
+    /// a run.
+    pub(crate) fn measure(&mut self, index: usize, body: &Body, state: &BodyState, meter: &mut ShapeMeter) {
+        let Shape { finite, inverted, min_volume_ratio, stretched } = meter.measure(body, state);
         if !finite || !state.v.iter().all(|v| v.is_finite()) {
             let divergence = Some(Divergence::NonFinite { body: index });
             *self = Self { max_speed: 0.0, inverted: 0, min_volume_ratio: f64::INFINITY, divergence, ..*self };

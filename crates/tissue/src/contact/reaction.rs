@@ -14,12 +14,25 @@ pub(crate) struct Reaction {
     psi: Box<dyn Hyperelastic>,
     /// By vertex: the tool that carries it.
     carrier: Vec<Option<usize>>,
+    /// The same when the elements and nodes were listed.
+    listed: Vec<Option<usize>>,
+    /// Elements with a node that is carried, and the nodes that are.
+    elements: Vec<u32>,
+    nodes: Vec<u32>,
     forces: Vec<ToolForce>,
 }
 
 impl Reaction {
     pub fn new(body: &Body) -> Self {
-        Self { psi: body.material.hyperelastic(), carrier: vec![None; body.len()], forces: Vec::new() }
+        let none = vec![None; body.len()];
+        Self {
+            psi: body.material.hyperelastic(),
+            carrier: none.clone(),
+            listed: none,
+            elements: Vec::new(),
+            nodes: Vec::new(),
+            forces: Vec::new(),
+        }
     }
 
     /// Forces of the body on each tool.
@@ -41,6 +54,7 @@ impl Reaction {
         for grasp in frame.grasps().filter(rigid) {
             grasp.nodes.iter().for_each(|node| self.carrier[vertex(*node)] = Some(grasp.tool));
         }
+        self.list(body);
         let place = |node: u32| state.x[vertex(node)].as_dvec3();
         let mut pull = |node: u32, force: DVec3| {
             if let Some(tool) = self.carrier[vertex(node)] {
@@ -48,18 +62,32 @@ impl Reaction {
                 self.forces[tool].constraint += Wrench::at(force, arm);
             }
         };
-        for (t, tet) in body.rest.tets.iter().enumerate() {
-            if tet.iter().all(|node| self.carrier[vertex(*node)].is_none()) {
-                continue;
-            }
+        for t in self.elements.iter().map(|t| *t as usize) {
+            let tet = &body.rest.tets[t];
             let gradients = shape_gradients(&body.rest, t);
             let column = |c: usize| (0..4).map(|k| place(tet[k]) * gradients[k][c]).sum();
             let stress = self.psi.stress(DMat3::from_cols(column(0), column(1), column(2))) * body.volumes[t];
             tet.iter().zip(&gradients).for_each(|(node, m)| pull(*node, -(stress * *m)));
         }
-        for node in 0..body.len() as u32 {
-            pull(node, body.mass(node as usize) * frame.gravity);
+        for node in &self.nodes {
+            pull(*node, body.mass(*node as usize) * frame.gravity);
         }
+    }
+
+    /// Lists the elements and nodes at the vertices that are carried, if these are others than
+    /// before.
+    fn list(&mut self, body: &Body) {
+        let Self { carrier, listed, elements, nodes, .. } = self;
+        if carrier == listed {
+            return;
+        }
+        let is_carried = |node: &u32| carrier[body.internal[*node as usize] as usize].is_some();
+        nodes.clear();
+        nodes.extend((0..body.len() as u32).filter(is_carried));
+        elements.clear();
+        let tets = (0..).zip(&body.rest.tets);
+        elements.extend(tets.filter(|(_, tet)| tet.iter().any(is_carried)).map(|(t, _): (u32, _)| t));
+        listed.clone_from(carrier);
     }
 
     /// Takes the forces over from a solver that knows them. No force of another body is added to

@@ -22,8 +22,8 @@ pub(super) struct Elements {
     /// Volume ratios at the accepted positions, and at those of the last evaluation.
     pub ratios: Vec<[f32; LANES]>,
     pub trial: Vec<[f32; LANES]>,
-    /// Whether an element may have been stretched beyond the limit in an evaluation since the
-    /// stiffened elements were last sought in vain.
+    /// Whether an element was stretched beyond the limit in an evaluation since the stiffened
+    /// elements were last sought in vain.
     pub stretched: bool,
     /// The dashpots along their edges.
     pub dashpots: Dashpots,
@@ -113,7 +113,7 @@ impl Block<'_> {
 struct Found {
     /// Whether an element has lost too much of its accepted volume.
     squeezed: bool,
-    /// Whether one may be stretched beyond the limit.
+    /// Whether one is stretched beyond the limit.
     stretched: bool,
 }
 
@@ -158,8 +158,7 @@ impl Kernel<'_> {
             if simd.any_true_mask32x16(simd.simd_gt_f32x16(square, splat(simd, MAX_FREE_STRETCH_SQUARED as f32)))
                 && let Some(limit) = self.limit
             {
-                stretched = true;
-                add_limit(simd, limit, &f, &mut p);
+                stretched |= add_limit(simd, limit, &f, &mut p);
             }
             let volume = load(simd, &batch.volumes);
             for c in 0..3 {

@@ -1,7 +1,7 @@
 //! Stresses of sixteen elements at once.
 
 use crate::lanes::{LANES, Mat3L, add, apply, cofactor, dot, load, rotation, scale, splat, sub};
-use crate::material::{StretchEnergy, VolumeEnergy};
+use crate::material::{MAX_FREE_STRETCH_SQUARED, StretchEnergy, VolumeEnergy};
 use crate::{ConstitutiveModel, Corotated, Material, StableNeoHookean};
 use fearless_simd::{Simd, SimdBase, f32x16};
 use glam::DMat3;
@@ -126,28 +126,57 @@ impl Volume {
     }
 }
 
-/// Adds to the stress of F what limits large stretches, in the lanes where it acts.
+/// Adds to the stress of F what limits large stretches. Returns whether a stretch is beyond the
+/// limit in any lane.
+#[inline(always)]
+pub(super) fn add_limit<S: Simd>(simd: S, limit: &StretchEnergy, f: &Mat3L<S>, p: &mut Mat3L<S>) -> bool {
+    let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
+    // Principal stretches are within the limit where 16 I - F'F is positive definite: where its
+    // leading minors are positive (Sylvester).
+    let most = splat(simd, MAX_FREE_STRETCH_SQUARED as f32);
+    let [xx, yy, zz] = [0, 1, 2].map(|c| most - dot(f[c], f[c]));
+    let [xy, yz, zx] = [dot(f[0], f[1]), dot(f[1], f[2]), dot(f[2], f[0])];
+    let (second, first) = (xx * yy - xy * xy, xx);
+    let third = zz * second - (xx * yz * yz + yy * zx * zx + (xy + xy) * (yz * zx));
+    let least = simd.min_f32x16(simd.min_f32x16(first, second), third);
+    let within = simd.simd_gt_f32x16(least, zero);
+    if simd.all_true_mask32x16(within) {
+        return false;
+    }
+    let mut acts = [0.0; LANES];
+    simd.select_f32x16(within, zero, one).store_slice(&mut acts);
+    let (stretch, mut sum) = (stored(f), stored(p));
+    add_limit_to(limit, &acts, &stretch, &mut sum);
+    *p = sum.map(|column| column.map(|numbers| load(simd, &numbers)));
+    true
+}
+
+/// Numbers of the lanes of a matrix.
+#[inline(always)]
+fn stored<S: Simd>(m: &Mat3L<S>) -> [[[f32; LANES]; 3]; 3] {
+    let mut numbers = [[[0.0; LANES]; 3]; 3];
+    for (to, from) in numbers.as_flattened_mut().iter_mut().zip(m.as_flattened()) {
+        from.store_slice(to);
+    }
+    numbers
+}
+
+/// Adds it in the lanes where it `acts`.
 #[cold]
 #[inline(never)]
-pub(super) fn add_limit<S: Simd>(simd: S, limit: &StretchEnergy, f: &Mat3L<S>, p: &mut Mat3L<S>) {
-    let stored = |m: &Mat3L<S>| {
-        m.map(|column| {
-            column.map(|entries| {
-                let mut numbers = [0.0f32; LANES];
-                entries.store_slice(&mut numbers);
-                numbers
-            })
-        })
-    };
-    let (f, mut sum) = (stored(f), stored(p));
-    for lane in 0..LANES {
+fn add_limit_to(
+    limit: &StretchEnergy,
+    acts: &[f32; LANES],
+    f: &[[[f32; LANES]; 3]; 3],
+    sum: &mut [[[f32; LANES]; 3]; 3],
+) {
+    for lane in (0..LANES).filter(|lane| acts[*lane] != 0.0) {
         let f = DMat3::from_cols_array_2d(&f.map(|column| column.map(|numbers| f64::from(numbers[lane]))));
         let part = limit.stress(f).to_cols_array_2d();
         for (sum, part) in sum.as_flattened_mut().iter_mut().zip(part.as_flattened()) {
             sum[lane] += *part as f32;
         }
     }
-    *p = sum.map(|column| column.map(|numbers| load(simd, &numbers)));
 }
 
 /// Green's strain (F'F - I)/2: xx, yy, zz, xy, yz, zx.
