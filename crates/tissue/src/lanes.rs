@@ -135,6 +135,7 @@ pub(crate) fn rotation<S: Simd>(simd: S, f: &Mat3L<S>, least: f32) -> Mat3L<S> {
         }
     }
     for round in 0..POLAR_ROUNDS {
+        let before = x;
         let cofactor = cofactor(&x);
         let inverse = one / dot(x[0], cofactor[0]);
         let (mut near, mut far) = (half, half * inverse);
@@ -148,11 +149,24 @@ pub(crate) fn rotation<S: Simd>(simd: S, f: &Mat3L<S>, least: f32) -> Mat3L<S> {
         for c in 0..3 {
             x[c] = add(scale(x[c], near), scale(cofactor[c], far));
         }
+        // The next round would square what is left.
+        let mut change = zero;
+        for c in 0..3 {
+            let by = sub(x[c], before[c]);
+            change = simd.max_f32x16(change, dot(by, by));
+        }
+        if !simd.any_true_mask32x16(simd.simd_ge_f32x16(change, splat(simd, POLAR_TOLERANCE))) {
+            break;
+        }
     }
     x
 }
 
-/// Rounds of the polar decomposition, and how many of them are scaled: enough for condition numbers
+/// Squared change of a column by the last round of the polar decomposition: what is left is
+/// rounding.
+const POLAR_TOLERANCE: f32 = 1e-7;
+
+/// Most rounds of the polar decomposition, and how many of them are scaled: enough for condition numbers
 /// up to a thousand.
 const POLAR_ROUNDS: usize = 8;
 const SCALED_POLAR_ROUNDS: usize = 3;

@@ -42,6 +42,20 @@ pub(crate) fn for_each<T: Send>(items: &mut [T], work: impl Fn(&mut T) + Send + 
     }
 }
 
+/// Calls `work` with every item and its companion.
+pub(crate) fn for_each_with<T: Send, U: Send>(
+    items: &mut [T],
+    companions: &mut [U],
+    work: impl Fn(&mut T, &mut U) + Send + Sync,
+) {
+    if items.len() > 1 && has_threads() {
+        let pairs = items.par_iter_mut().zip(companions).with_max_len(1);
+        section(|| pairs.for_each(|(item, companion)| work(item, companion)));
+    } else {
+        items.iter_mut().zip(companions).for_each(|(item, companion)| work(item, companion));
+    }
+}
+
 /// Calls `work` with parts of at least `least` items, at most eight of equal size, and the number
 /// of each part's first one.
 pub(crate) fn in_parts<T: Send>(items: &mut [T], least: usize, work: impl Fn(usize, &mut [T]) + Send + Sync) {

@@ -16,8 +16,9 @@ pub(crate) struct Reaction {
     carrier: Vec<Option<usize>>,
     /// The same when the elements and nodes were listed.
     listed: Vec<Option<usize>>,
-    /// Elements with a node that is carried, and the nodes that are.
-    elements: Vec<u32>,
+    /// Elements with a node that is carried, with the gradients of their shape functions (1/m);
+    /// and the nodes that are carried.
+    elements: Vec<(usize, [DVec3; 4])>,
     nodes: Vec<u32>,
     forces: Vec<ToolForce>,
 }
@@ -62,12 +63,12 @@ impl Reaction {
                 self.forces[tool].constraint += Wrench::at(force, arm);
             }
         };
-        for t in self.elements.iter().map(|t| *t as usize) {
-            let tet = &body.rest.tets[t];
-            let gradients = shape_gradients(&body.rest, t);
-            let column = |c: usize| (0..4).map(|k| place(tet[k]) * gradients[k][c]).sum();
-            let stress = self.psi.stress(DMat3::from_cols(column(0), column(1), column(2))) * body.volumes[t];
-            tet.iter().zip(&gradients).for_each(|(node, m)| pull(*node, -(stress * *m)));
+        for (t, gradients) in &self.elements {
+            let (tet, volume) = (&body.rest.tets[*t], body.volumes[*t]);
+            let places = tet.map(place);
+            let column = |c: usize| (0..4).map(|k| places[k] * gradients[k][c]).sum();
+            let stress = self.psi.stress(DMat3::from_cols(column(0), column(1), column(2))) * volume;
+            tet.iter().zip(gradients).for_each(|(node, m)| pull(*node, -(stress * *m)));
         }
         for node in &self.nodes {
             pull(*node, body.mass(*node as usize) * frame.gravity);
@@ -85,8 +86,8 @@ impl Reaction {
         nodes.clear();
         nodes.extend((0..body.len() as u32).filter(is_carried));
         elements.clear();
-        let tets = (0..).zip(&body.rest.tets);
-        elements.extend(tets.filter(|(_, tet)| tet.iter().any(is_carried)).map(|(t, _): (u32, _)| t));
+        let tets = body.rest.tets.iter().enumerate().filter(|(_, tet)| tet.iter().any(is_carried));
+        elements.extend(tets.map(|(t, _)| (t, shape_gradients(&body.rest, t))));
         listed.clone_from(carrier);
     }
 

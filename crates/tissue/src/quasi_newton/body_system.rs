@@ -133,7 +133,8 @@ impl QuasiNewtonSolver {
 
     /// Begins a frame.
     pub fn begin_frame(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
-        self.iterate.load(&self.layout, state);
+        let same = self.iterate.load(&self.layout, state);
+        self.elements.is_accepted_here &= same;
         if self.mark_held(frame, body) {
             self.rest.has_gradient = false;
         }
@@ -409,11 +410,13 @@ impl QuasiNewtonSolver {
 
     /// Moves all nodes alike (m).
     pub fn shift(&mut self, by: Vec3A) {
+        self.elements.is_accepted_here = false;
         self.iterate.x[..self.layout.free].iter_mut().for_each(|row| add(row, by));
     }
 
     /// Restores the beginning of the substep.
     pub fn restore(&mut self) {
+        self.elements.is_accepted_here = false;
         self.iterate.restore(self.layout.free);
     }
 

@@ -22,13 +22,16 @@ pub(super) struct Elements {
     /// Volume ratios at the accepted positions, and at those of the last evaluation.
     pub ratios: Vec<[f32; LANES]>,
     pub trial: Vec<[f32; LANES]>,
-    /// Whether an element was stretched beyond the limit in an evaluation since the stiffened
-    /// elements were last sought in vain.
+    /// Elements that are stretched beyond the limit at the last evaluation, a bit for each lane of a
+    /// batch; and whether there is any.
+    pub beyond: Vec<u16>,
     pub stretched: bool,
     /// The dashpots along their edges.
     pub dashpots: Dashpots,
     /// Whether the last evaluation was of a body at rest, by `evaluate_in_place`.
     pub in_place: bool,
+    /// Whether the volumes that were accepted last are those where a frame begins.
+    pub is_accepted_here: bool,
 }
 
 impl Elements {
@@ -40,9 +43,11 @@ impl Elements {
             corners: vec![[0.0; 4]; batches * 4 * LANES],
             ratios: vec![[1.0; LANES]; batches],
             trial: vec![[1.0; LANES]; batches],
+            beyond: vec![0; batches],
             stretched: false,
             dashpots: Dashpots::new(layout, body),
             in_place: false,
+            is_accepted_here: false,
         }
     }
 
@@ -50,17 +55,18 @@ impl Elements {
     /// whether an element has lost too much of its accepted volume.
     pub fn evaluate(&mut self, level: Level, layout: &Layout, at: &Iterate, h: f32) -> bool {
         self.in_place = false;
-        let Self { stress, limit, corners, ratios, trial, dashpots, .. } = self;
+        let Self { stress, limit, corners, ratios, trial, beyond, dashpots, .. } = self;
         dashpots.refresh(level, layout, &at.start, h);
         let kernel = Kernel { level, stress, limit: limit.as_ref(), x: &at.x };
         let dashpots = &dashpots.batches;
-        let found = kernel.evaluate(Block { batches: &layout.batches, ratios, dashpots, trial, corners });
-        self.stretched |= found.stretched;
+        let found = kernel.evaluate(Block { batches: &layout.batches, ratios, dashpots, trial, beyond, corners });
+        self.stretched = found.stretched;
         found.squeezed
     }
 
     /// Accepts the positions of the last evaluation.
     pub fn accept(&mut self) {
+        self.is_accepted_here = true;
         std::mem::swap(&mut self.ratios, &mut self.trial);
     }
 
@@ -84,6 +90,7 @@ struct Block<'a> {
     /// Empty without viscosity.
     dashpots: &'a [BatchDashpots],
     trial: &'a mut [[f32; LANES]],
+    beyond: &'a mut [u16],
     corners: &'a mut [Row],
 }
 
@@ -94,14 +101,16 @@ impl Block<'_> {
         let (ratios, other_ratios) = self.ratios.split_at(at);
         let (dashpots, other_dashpots) = self.dashpots.split_at(at.min(self.dashpots.len()));
         let (trial, other_trial) = self.trial.split_at_mut(at);
+        let (beyond, other_beyond) = self.beyond.split_at_mut(at);
         let (corners, other_corners) = self.corners.split_at_mut(at * 4 * LANES);
         (
-            Self { batches, ratios, dashpots, trial, corners },
+            Self { batches, ratios, dashpots, trial, beyond, corners },
             Self {
                 batches: other_batches,
                 ratios: other_ratios,
                 dashpots: other_dashpots,
                 trial: other_trial,
+                beyond: other_beyond,
                 corners: other_corners,
             },
         )
@@ -144,7 +153,7 @@ impl Kernel<'_> {
     /// The kernel.
     #[inline(always)]
     fn evaluate_with<S: Simd, const VISCOUS: bool>(&self, simd: S, block: Block<'_>) -> Found {
-        let Block { batches, ratios, dashpots, trial, corners } = block;
+        let Block { batches, ratios, dashpots, trial, beyond, corners } = block;
         let zero = splat(simd, 0.0);
         let (mut squeezed, mut stretched) = (zero, false);
         for (b, batch) in batches.iter().enumerate() {
@@ -154,11 +163,13 @@ impl Kernel<'_> {
             ratio.store_slice(&mut trial[b]);
             squeezed = simd.max_f32x16(squeezed, lack(simd, ratio, load(simd, &ratios[b])));
             let mut p = self.stress.at(simd, &f, ratio);
+            beyond[b] = 0;
             let square = dot(f[0], f[0]) + dot(f[1], f[1]) + dot(f[2], f[2]);
             if simd.any_true_mask32x16(simd.simd_gt_f32x16(square, splat(simd, MAX_FREE_STRETCH_SQUARED as f32)))
                 && let Some(limit) = self.limit
             {
-                stretched |= add_limit(simd, limit, &f, &mut p);
+                beyond[b] = add_limit(simd, limit, &f, &mut p);
+                stretched |= beyond[b] != 0;
             }
             let volume = load(simd, &batch.volumes);
             for c in 0..3 {

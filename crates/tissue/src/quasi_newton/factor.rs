@@ -1,7 +1,7 @@
 //! The preconditioner of one body: its stiffness at rest with the masses of a substep, factorised
 //! once and packed.
 
-use super::tiles::Tiles;
+use super::tiles::{ChainRoom, Tiles};
 use crate::Body;
 use crate::assembly::{Stiffness, blocks, shape_gradients, tangent};
 use crate::lanes::Row;
@@ -144,12 +144,23 @@ impl Factor {
         self.scale(x);
     }
 
-    /// The first half for an `x` that has numbers only in the chain of supernodes from that of
-    /// `number` up to the root. Writes the numbers of these supernodes to `ranges`.
+    /// The first half for an `x` that is 1 at `number` and else 0, precisely: the numbers of the
+    /// chain of supernodes from that of `number` up to the root, and their ranges.
     #[inline(always)]
-    pub fn forward_chain<S: Simd>(&mut self, simd: S, number: usize, x: &mut [f32], ranges: &mut Vec<Range<usize>>) {
-        self.scale(x);
-        self.tiles.forward_chain(simd, number, x, ranges);
+    pub fn forward_chain<S: Simd>(
+        &self,
+        simd: S,
+        number: usize,
+        room: &mut ChainRoom,
+        column: &mut Vec<f32>,
+        ranges: &mut Vec<Range<usize>>,
+    ) {
+        self.tiles.forward_chain(simd, (number, self.scale[number]), room, column, ranges);
+    }
+
+    /// Room for it.
+    pub fn chain_room(&self) -> ChainRoom {
+        self.tiles.chain_room(self.scale.len())
     }
 
     #[inline(always)]

@@ -6,6 +6,7 @@
 //! of a body, so the columns are short. A node's three lie on the same chain.
 
 use super::factor::Factor;
+use super::tiles::ChainRoom;
 use crate::lanes::{LANES, add_up, splat};
 use fearless_simd::{Simd, SimdBase, f32x16};
 use std::ops::Range;
@@ -20,18 +21,17 @@ pub(super) struct HalfColumns {
 }
 
 impl HalfColumns {
-    /// Solves for the columns of a node. `scratch` is as long as the vectors of a solve.
+    /// Solves for the columns of a node.
     #[inline(always)]
-    pub fn solve<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32], node: usize) {
+    pub fn solve<S: Simd>(&mut self, simd: S, factor: &Factor, room: &mut ChainRoom, node: usize) {
         for (c, column) in self.columns.iter_mut().enumerate() {
-            scratch.fill(0.0);
-            scratch[3 * node + c] = 1.0;
-            factor.forward_chain(simd, 3 * node + c, scratch, &mut self.ranges);
-            column.clear();
-            for range in &self.ranges {
-                column.extend_from_slice(&scratch[range.clone()]);
-            }
+            factor.forward_chain(simd, 3 * node + c, room, column, &mut self.ranges);
         }
+    }
+
+    /// The numbers of the chain.
+    pub fn ranges(&self) -> &[Range<usize>] {
+        &self.ranges
     }
 
     /// Products with a vector that is solved by half.
@@ -65,16 +65,21 @@ impl HalfColumns {
         products
     }
 
-    /// y -= the columns times their `shares`, for a vector that is solved by half.
+    /// y -= the columns times their `shares`, for a vector that is solved by half, of which `y` has
+    /// the numbers from `first` on.
     #[inline(always)]
-    pub fn subtract(&self, shares: [f64; 3], y: &mut [f32]) {
+    pub fn subtract(&self, shares: [f64; 3], first: usize, y: &mut [f32]) {
         let (mut at, shares) = (0, shares.map(|share| share as f32));
-        let [first, second, third] = &self.columns;
+        let end = first + y.len();
+        let [one, two, three] = &self.columns;
         for range in &self.ranges {
-            let numbers = at..at + range.len();
-            let columns = first[numbers.clone()].iter().zip(&second[numbers.clone()]).zip(&third[numbers]);
-            for (y, ((a, b), c)) in y[range.clone()].iter_mut().zip(columns) {
-                *y -= shares[0] * a + shares[1] * b + shares[2] * c;
+            let (from, to) = (range.start.max(first), range.end.min(end));
+            if from < to {
+                let numbers = at + from - range.start..at + to - range.start;
+                let columns = one[numbers.clone()].iter().zip(&two[numbers.clone()]).zip(&three[numbers]);
+                for (y, ((a, b), c)) in y[from - first..to - first].iter_mut().zip(columns) {
+                    *y -= shares[0] * a + shares[1] * b + shares[2] * c;
+                }
             }
             at += range.len();
         }

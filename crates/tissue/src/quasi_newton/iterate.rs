@@ -1,7 +1,7 @@
 //! The vectors of a body that a search works on.
 
 use super::layout::Layout;
-use crate::lanes::Row;
+use crate::lanes::{LANES, Row};
 use crate::state::BodyState;
 use glam::Vec3A;
 
@@ -58,14 +58,18 @@ impl Iterate {
         }
     }
 
-    /// Loads positions and velocities from the state.
-    pub fn load(&mut self, layout: &Layout, state: &BodyState) {
-        for (i, vertex) in layout.vertex.iter().enumerate() {
-            self.x[i] = state.x[*vertex as usize].extend(0.0).to_array();
+    /// Loads positions and velocities from the state. Returns whether all nodes are where they were.
+    pub fn load(&mut self, layout: &Layout, state: &BodyState) -> bool {
+        let mut same = true;
+        for (x, vertex) in self.x.iter_mut().zip(&layout.vertex) {
+            let now = state.x[*vertex as usize].extend(0.0).to_array();
+            same &= now == *x;
+            *x = now;
         }
         for i in 0..layout.free {
             self.v[i] = state.v[layout.vertex[i] as usize].extend(0.0).to_array();
         }
+        same
     }
 
     /// Stores positions and velocities in the state.
@@ -110,19 +114,46 @@ pub(super) fn position(row: &Row) -> Vec3A {
 /// Largest absolute coordinate of any row; infinite if one is not finite.
 #[inline(always)]
 pub(super) fn max_coordinate(rows: &[Row]) -> f32 {
-    let mut most = [0.0f32; 4];
-    let mut sane = true;
-    for row in rows {
-        for c in 0..4 {
-            most[c] = most[c].max(row[c].abs());
+    let (mut most, mut strange) = ([0.0f32; LANES], [0.0f32; LANES]);
+    let (chunks, rest) = rows.as_flattened().as_chunks::<LANES>();
+    for chunk in chunks {
+        for lane in 0..LANES {
+            let size = chunk[lane].abs();
+            most[lane] = if size > most[lane] { size } else { most[lane] };
+            // NaN if the number is not finite.
+            strange[lane] += size - size;
         }
-        sane &= row[0].is_finite() & row[1].is_finite() & row[2].is_finite();
     }
-    if sane { most[0].max(most[1]).max(most[2]) } else { f32::INFINITY }
+    for number in rest {
+        most[0] = most[0].max(number.abs());
+        strange[0] += number - number;
+    }
+    if strange == [0.0; LANES] { most.into_iter().fold(0.0, f32::max) } else { f32::INFINITY }
 }
 
 /// Adds to a row.
 #[inline(always)]
 pub(super) fn add(row: &mut Row, by: Vec3A) {
     row.iter_mut().zip(by.to_array()).for_each(|(sum, part)| *sum += part);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::max_coordinate;
+
+    #[test]
+    fn the_largest_coordinate_is_found_in_any_row() {
+        for count in [1, 4, 7, 33] {
+            for at in 0..count {
+                for (number, expected) in
+                    [(-3.0, 3.0), (f32::NAN, f32::INFINITY), (f32::NEG_INFINITY, f32::INFINITY), (0.5, 1.0)]
+                {
+                    let mut rows = vec![[-1.0, 0.0, 1.0, 0.0]; count];
+                    rows[at][1] = number;
+                    assert_eq!(max_coordinate(&rows), expected, "{number} at {at} of {count}");
+                }
+            }
+        }
+        assert_eq!(max_coordinate(&[]), 0.0);
+    }
 }

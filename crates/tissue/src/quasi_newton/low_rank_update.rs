@@ -11,20 +11,20 @@
 //! until the factor changes, and stay valid however the tissue turns. Springs that come, go, turn
 //! or harden need no other solve.
 
-use super::dense::decompose;
+use super::column_cache::{ColumnCache, MAX_COLUMNS, MAX_NODES};
+use super::dense::{decompose, solve};
 use super::factor::Factor;
-use super::half_columns::HalfColumns;
 use super::springs::{Springs, Term};
-use fearless_simd::Simd;
-
-/// Greatest number of nodes in the update.
-const MAX_NODES: usize = 128;
-
-/// Greatest number of columns.
-const MAX_COLUMNS: usize = 3 * MAX_NODES;
+use crate::threads::for_each;
+use fearless_simd::{Level, dispatch};
 
 /// Greatest number of springs in the update.
 const MAX_SPRINGS: usize = 256;
+
+/// Fewest springs whose matrix several threads build, and the ends of parts of a triangle's columns
+/// that are as much work, 1 - sqrt(1 - k/4).
+const MIN_PARTED: usize = 48;
+const EVEN_ENDS: [f64; 4] = [0.134, 0.293, 0.5, 1.0];
 
 /// The difference between the matrix now and the factor.
 pub(super) struct LowRankUpdate {
@@ -32,14 +32,7 @@ pub(super) struct LowRankUpdate {
     springs: Springs,
     /// The place of each of their terms' nodes.
     places: Vec<usize>,
-    /// The places of all their nodes, each once.
-    used: Vec<usize>,
-    /// Nodes whose columns are known, by place.
-    known: Vec<u32>,
-    columns: Vec<HalfColumns>,
-    /// Products of each column with all, three columns a place, row by row. Memory is allocated for
-    /// all, and touched as places are used.
-    products: Vec<f64>,
+    columns: ColumnCache,
     /// K^-1 + V'V as L D L', by columns: what is below the diagonal of L, and D on it.
     matrix: Vec<f64>,
     /// Scratch: one number a spring.
@@ -58,10 +51,7 @@ impl LowRankUpdate {
         Self {
             springs: Springs::with_capacity(MAX_SPRINGS),
             places: Vec::with_capacity(3 * MAX_SPRINGS),
-            used: Vec::with_capacity(MAX_NODES),
-            known: Vec::with_capacity(MAX_NODES),
-            columns: vec![HalfColumns::default(); MAX_NODES],
-            products: vec![0.0; MAX_COLUMNS * MAX_COLUMNS],
+            columns: ColumnCache::new(),
             matrix: vec![0.0; MAX_SPRINGS * MAX_SPRINGS],
             shares: Vec::with_capacity(MAX_SPRINGS),
             of_columns: vec![0.0; MAX_COLUMNS],
@@ -72,7 +62,7 @@ impl LowRankUpdate {
 
     /// Forgets everything: the factor has changed.
     pub fn clear(&mut self) {
-        self.known.clear();
+        self.columns.clear();
         self.reset();
     }
 
@@ -96,66 +86,37 @@ impl LowRankUpdate {
     /// Sets the springs. Those that are added come first. Those that are taken away follow; they
     /// are no stiffer than what the factor has there. Springs beyond the limits are removed from
     /// the list.
-    #[inline(always)]
-    pub fn set<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32], springs: &mut Springs) {
+    pub fn set(&mut self, level: Level, factor: &Factor, springs: &mut Springs) {
         self.limit(springs);
         if springs.are_like(&self.springs) {
             return;
         }
         self.springs.copy_from(springs);
-        self.find_places(simd, factor, scratch);
-        self.usable = self.factorise(simd);
-    }
-
-    /// Finds the places of all terms, and solves for the columns of nodes that are not known.
-    #[inline(always)]
-    fn find_places<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32]) {
-        let mut unused = 0;
-        self.places.clear();
-        self.used.clear();
-        for t in 0..self.springs.terms().len() {
-            let node = self.springs.terms()[t].node;
-            // Solves in a closure that is not inlined would be compiled without the instruction set
-            // of `S`, and each of their operations would be a call.
-            let place = match self.known.iter().position(|known| *known == node) {
-                Some(place) => place,
-                None => {
-                    let place = if self.known.len() < MAX_NODES {
-                        self.known.push(node);
-                        self.known.len() - 1
-                    } else {
-                        // A place whose node no spring has.
-                        while self.springs.terms().iter().any(|term| term.node == self.known[unused]) {
-                            unused += 1;
-                        }
-                        self.known[unused] = node;
-                        unused
-                    };
-                    self.solve(simd, factor, scratch, place);
-                    place
-                }
-            };
-            self.places.push(place);
-            if !self.used.contains(&place) {
-                self.used.push(place);
-            }
-        }
+        let Self { springs, places, columns, nodes, .. } = self;
+        columns.use_nodes(level, factor, nodes);
+        // Every node is in the list.
+        let number = |term: &Term| nodes.iter().position(|node| *node == term.node).unwrap_or(0);
+        places.clear();
+        places.extend(springs.terms().iter().map(|term| columns.used()[number(term)]));
+        self.usable = self.factorise(level);
     }
 
     /// Removes springs beyond the greatest number of springs, and those beyond the greatest number
-    /// of nodes.
+    /// of nodes. Lists the nodes of the others.
     fn limit(&mut self, springs: &mut Springs) {
         springs.truncate(MAX_SPRINGS);
         let Self { nodes, .. } = self;
         nodes.clear();
         let mut kept = 0;
         for (_, range) in springs.ranges() {
+            let before = nodes.len();
             for term in &springs.terms()[range] {
                 if !nodes.contains(&term.node) {
                     nodes.push(term.node);
                 }
             }
             if nodes.len() > MAX_NODES {
+                nodes.truncate(before);
                 break;
             }
             kept += 1;
@@ -163,95 +124,89 @@ impl LowRankUpdate {
         springs.truncate(kept);
     }
 
-    /// Solves for the columns of a place, and multiplies them with all others.
-    #[inline(always)]
-    fn solve<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32], place: usize) {
-        self.columns[place].solve(simd, factor, scratch, self.known[place] as usize);
-        for other in 0..self.known.len() {
-            let block = self.columns[place].product_with(simd, &self.columns[other]);
-            for (r, row) in block.into_iter().enumerate() {
-                for (c, product) in row.into_iter().enumerate() {
-                    self.products[MAX_COLUMNS * (3 * place + r) + 3 * other + c] = product;
-                    self.products[MAX_COLUMNS * (3 * other + c) + 3 * place + r] = product;
-                }
-            }
-        }
-    }
-
     /// Builds the matrix of the springs and its L D L'. False if the sum is not positive definite.
-    #[inline(always)]
-    fn factorise<S: Simd>(&mut self, simd: S) -> bool {
+    fn factorise(&mut self, level: Level) -> bool {
         let n = self.springs.len();
-        simd.vectorize(
-            #[inline(always)]
-            || self.build(),
-        );
-        simd.vectorize(
-            #[inline(always)]
-            || decompose(&mut self.matrix, n),
-        );
+        if n == 0 {
+            return false;
+        }
+        self.build(level);
+        let Self { matrix, springs, .. } = self;
+        dispatch!(level, _simd => decompose(matrix, n));
         // Springs that are taken away make D negative there, added ones positive: it is
         // quasi-definite.
-        let positive = |(j, (stiffness, _)): (usize, (f32, _))| self.matrix[j * n + j] * f64::from(stiffness) > 0.0;
-        n > 0 && self.springs.ranges().enumerate().all(positive)
+        let positive = |(j, (stiffness, _)): (usize, (f32, _))| matrix[j * n + j] * f64::from(stiffness) > 0.0;
+        springs.ranges().enumerate().all(positive)
     }
 
     /// K^-1 + V'V, from the diagonal down.
-    #[inline(always)]
-    fn build(&mut self) {
-        let Self { springs, places, known, products, matrix, of_columns, .. } = self;
-        let (n, terms) = (springs.len(), springs.terms());
-        let of_columns = &mut of_columns[..3 * known.len()];
-        for (j, (stiffness, range)) in springs.ranges().enumerate() {
-            // All columns times this spring's.
-            of_columns.fill(0.0);
-            for (term, place) in terms[range.clone()].iter().zip(&places[range]) {
-                for (c, along) in term.along.iter().enumerate() {
-                    let row = &products[MAX_COLUMNS * (3 * place + c)..];
-                    of_columns.iter_mut().zip(row).for_each(|(sum, product)| *sum += f64::from(*along) * product);
-                }
-            }
-            let column = &mut matrix[j * n..(j + 1) * n];
-            for (number, (_, range)) in column.iter_mut().zip(springs.ranges()).skip(j) {
-                *number = along(&terms[range.clone()], &places[range], of_columns);
-            }
-            column[j] += 1.0 / f64::from(stiffness);
+    fn build(&mut self, level: Level) {
+        let Self { springs, places, columns, matrix, .. } = self;
+        let (n, columns) = (springs.len(), &*columns);
+        let ends = if n < MIN_PARTED { [1.0, 1.0, 1.0, 1.0] } else { EVEN_ENDS };
+        let mut parts: [(usize, &mut [f64]); EVEN_ENDS.len()] = Default::default();
+        let (mut rest, mut first) = (&mut matrix[..n * n], 0);
+        for (part, end) in parts.iter_mut().zip(ends) {
+            let end = (end * n as f64) as usize;
+            let (numbers, others) = rest.split_at_mut(n * (end - first));
+            *part = (first, numbers);
+            (rest, first) = (others, end);
         }
+        let used = if n < MIN_PARTED { 1 } else { parts.len() };
+        for_each(&mut parts[..used], |(first, numbers)| {
+            let mut of_columns = [0.0; MAX_COLUMNS];
+            let of_columns = &mut of_columns[..columns.len()];
+            dispatch!(level, _simd => for (j, column) in (*first..).zip(numbers.chunks_exact_mut(n)) {
+                build_column(springs, places, columns, j, of_columns, column);
+            });
+        });
     }
 
     /// Turns `y`, solved by half with the factor, into that of the sum.
-    #[inline(always)]
-    pub fn apply<S: Simd>(&mut self, simd: S, y: &mut [f32]) {
+    pub fn apply(&mut self, level: Level, y: &mut [f32]) {
         if !self.usable {
             return;
         }
-        let Self { springs, places, used, known, columns, matrix, shares, of_columns, .. } = self;
+        let Self { springs, places, columns, matrix, shares, of_columns, .. } = self;
         let terms = springs.terms();
-        for place in used.iter() {
-            of_columns[3 * place..3 * place + 3].copy_from_slice(&columns[*place].product(simd, y));
-        }
+        columns.multiply(level, y, of_columns);
         shares.clear();
         shares.extend(springs.ranges().map(|(_, range)| along(&terms[range.clone()], &places[range], of_columns)));
-        let n = shares.len();
-        for (k, l) in matrix.chunks_exact(n).take(n).enumerate() {
-            let (solved, below) = shares.split_at_mut(k + 1);
-            below.iter_mut().zip(&l[k + 1..]).for_each(|(sum, l)| *sum -= solved[k] * l);
-        }
-        for (k, l) in matrix.chunks_exact(n).take(n).enumerate().rev() {
-            let known: f64 = l[k + 1..].iter().zip(&shares[k + 1..]).map(|(l, share)| l * share).sum();
-            shares[k] = shares[k] / l[k] - known;
-        }
-        of_columns[..3 * known.len()].fill(0.0);
+        dispatch!(level, _simd => solve(matrix, shares));
+        of_columns[..columns.len()].fill(0.0);
         for (share, (_, range)) in shares.iter().zip(springs.ranges()) {
             for (term, place) in terms[range.clone()].iter().zip(&places[range]) {
                 let sums = &mut of_columns[3 * place..3 * place + 3];
                 sums.iter_mut().zip(term.along).for_each(|(sum, along)| *sum += share * f64::from(along));
             }
         }
-        for place in used.iter() {
-            columns[*place].subtract(std::array::from_fn(|c| of_columns[3 * place + c]), y);
+        columns.subtract(level, of_columns, y);
+    }
+}
+
+/// Column j of K^-1 + V'V, from the diagonal down.
+#[inline(always)]
+fn build_column(
+    springs: &Springs,
+    places: &[usize],
+    columns: &ColumnCache,
+    j: usize,
+    of_columns: &mut [f64],
+    column: &mut [f64],
+) {
+    let (terms, (stiffness, range)) = (springs.terms(), springs.range(j));
+    // All columns of the factor times this spring's.
+    of_columns.fill(0.0);
+    for (term, place) in terms[range.clone()].iter().zip(&places[range]) {
+        for (c, along) in term.along.iter().enumerate() {
+            let products = columns.products(*place, c);
+            of_columns.iter_mut().zip(products).for_each(|(sum, product)| *sum += f64::from(*along) * product);
         }
     }
+    for (number, (_, range)) in column.iter_mut().zip(springs.ranges()).skip(j) {
+        *number = along(&terms[range.clone()], &places[range], of_columns);
+    }
+    column[j] += 1.0 / f64::from(stiffness);
 }
 
 /// Product of a spring's vectors and a vector of one number for each column.
@@ -326,12 +281,11 @@ mod tests {
             springs.push_alike(stiffness, nodes[4] as u32);
             let right: Vec<f32> = (0..3 * free).map(|i| ((7 * i) % 11) as f32 - 5.0).collect();
             let [mut x, mut y, mut without] = [(); 3].map(|()| [&right[..], &[0.0; 16]].concat());
-            let mut scratch = vec![0.0; x.len()];
             let mut update = LowRankUpdate::new();
+            update.set(level, &before, &mut springs);
             dispatch!(level, simd => {
-                update.set(simd, &mut before, &mut scratch, &mut springs);
                 before.forward(simd, &mut x, true);
-                update.apply(simd, &mut x);
+                update.apply(level, &mut x);
                 before.backward(simd, &mut x, true);
                 before.forward(simd, &mut without, true);
                 before.backward(simd, &mut without, true);
@@ -351,10 +305,10 @@ mod tests {
             springs.push(stiffness, between[..2].iter().map(|term| Term { along: [0.6, -0.8, 0.1], ..*term }));
             springs.push(-stiffness, [Term { node: nodes[0] as u32, along: [0.0, 0.6, 0.8] }]);
             let mut x = [&right[..], &[0.0; 16]].concat();
+            update.set(level, &before, &mut springs);
             dispatch!(level, simd => {
-                update.set(simd, &mut before, &mut scratch, &mut springs);
                 before.forward(simd, &mut x, true);
-                update.apply(simd, &mut x);
+                update.apply(level, &mut x);
                 before.backward(simd, &mut x, true);
             });
             let at = |i: usize| Vec3A::from_slice(&x[3 * i..]);

@@ -15,6 +15,9 @@ const BLOCK: usize = 1024;
 const MIN_BLOCKS: usize = 3;
 pub(super) const MIN_ROWS: usize = MIN_BLOCKS * BLOCK;
 
+/// Most blocks of the products of a pair with itself; they are larger for a large body.
+const MAX_BLOCKS: usize = 64;
+
 /// Rows of a register.
 const QUAD: usize = 4;
 
@@ -96,12 +99,28 @@ impl Memory {
         self.measure(level, Half::Steps, used, &change);
         let count = self.pairs.len();
         used.iter().for_each(|older| self.products[older * count + at] = self.measured[*older]);
-        let step = &self.pairs[at].step;
-        let own = |a: &[Row], b: &[Row]| f64::from(dispatch!(level, simd => dot_rows(simd, a, b)));
-        let products = [own(step, &change), own(step, step), own(&change, &change)];
+        let products = self.own_products(level, &self.pairs[at].step, &change);
         self.products[at * count + at] = products[0];
         self.pairs[at].change = change;
         products
+    }
+
+    /// step . change, step . step and change . change.
+    fn own_products(&self, level: Level, step: &[Row], change: &[Row]) -> [f64; 3] {
+        let mut sums = [[0.0f32; 3]; MAX_BLOCKS];
+        let size = step.len().div_ceil(MAX_BLOCKS).next_multiple_of(QUAD).max(BLOCK);
+        let sums = &mut sums[..step.len().div_ceil(size)];
+        in_parts(sums, MIN_ROWS.div_ceil(size), |first, sums| {
+            for (k, sums) in sums.iter_mut().enumerate() {
+                let from = (first + k) * size;
+                let rows = from..step.len().min(from + size);
+                let (step, change) = (&step[rows.clone()], &change[rows]);
+                dispatch!(level, simd => {
+                    *sums = [dot_rows(simd, step, change), dot_rows(simd, step, step), dot_rows(simd, change, change)];
+                });
+            }
+        });
+        [0, 1, 2].map(|k| sums.iter().map(|sums| f64::from(sums[k])).sum())
     }
 
     /// Forgets a step.

@@ -19,6 +19,7 @@
 mod apply_step;
 mod body_system;
 mod coarse;
+mod column_cache;
 mod contact_springs;
 mod dashpots;
 mod dense;
@@ -76,7 +77,7 @@ impl Solver for QuasiNewtonSolver {
         for_each(island.slots, frame, |BodySlot { index, body, solver, state, .. }| {
             solver.begin_frame(&frame.of(*index), body, state);
         });
-        island.reset();
+        island.begin_frame();
     }
 
     fn substep(island: &mut IslandSystem<'_>, from: f64, to: f64) {
@@ -116,6 +117,18 @@ impl Sweeps for QuasiNewtonSolver {
 }
 
 impl IslandSystem<'_> {
+    /// Forgets the history, and evaluates the elements of bodies whose volumes are not known.
+    fn begin_frame(&mut self) {
+        self.history.clear();
+        let h = self.h;
+        for_each(self.slots, self.frame, |BodySlot { solver, .. }| {
+            solver.sleep.active = true;
+            if !solver.elements.is_accepted_here {
+                solver.evaluate_in_place(h);
+            }
+        });
+    }
+
     /// Forgets the history, and evaluates the elements as they are.
     fn reset(&mut self) {
         self.history.clear();

@@ -74,6 +74,12 @@ impl Springs {
         self.springs.iter().zip(first).map(|((stiffness, end), first)| (*stiffness, first..*end))
     }
 
+    /// Stiffness and terms of spring number `k`.
+    pub fn range(&self, k: usize) -> (f32, Range<usize>) {
+        let first = if k == 0 { 0 } else { self.springs[k - 1].1 };
+        (self.springs[k].0, first..self.springs[k].1)
+    }
+
     /// The terms of all.
     pub fn terms(&self) -> &[Term] {
         &self.terms

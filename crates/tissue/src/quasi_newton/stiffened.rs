@@ -48,9 +48,9 @@ impl Stiffened {
 }
 
 impl Elements {
-    /// Finds the stiffened elements at the accepted positions `x`, the stiffest first; `held` nodes
+    /// Finds the stiffened elements at the positions `x` of the last evaluation, the stiffest first; `held` nodes
     /// are not free.
-    pub fn find_stiffened(&mut self, layout: &Layout, x: &[Row], held: &[bool], found: &mut Vec<Stiffened>) {
+    pub fn find_stiffened(&self, layout: &Layout, x: &[Row], held: &[bool], found: &mut Vec<Stiffened>) {
         found.clear();
         let mut keep = |element: Stiffened| {
             let element = element.of_free_nodes(|i| i < layout.free && !held[i]);
@@ -67,13 +67,10 @@ impl Elements {
             }
         }
         if let (true, Some(limit)) = (self.stretched, &self.limit) {
-            self.stretched = false;
-            for batch in &layout.batches {
-                for lane in (0..LANES).filter(|lane| batch.volumes[*lane] > 0.0) {
-                    for element in stretched(batch, lane, x, batch.volumes[lane] * limit.mu as f32) {
-                        self.stretched = true;
-                        keep(element);
-                    }
+            for (beyond, batch) in self.beyond.iter().zip(&layout.batches).filter(|(beyond, _)| **beyond != 0) {
+                let is_beyond = |lane: &usize| beyond >> lane & 1 != 0 && batch.volumes[*lane] > 0.0;
+                for lane in (0..LANES).filter(is_beyond) {
+                    stretched(batch, lane, x, batch.volumes[lane] * limit.mu as f32).for_each(&mut keep);
                 }
             }
         }

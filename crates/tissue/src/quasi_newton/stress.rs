@@ -126,10 +126,10 @@ impl Volume {
     }
 }
 
-/// Adds to the stress of F what limits large stretches. Returns whether a stretch is beyond the
-/// limit in any lane.
+/// Adds to the stress of F what limits large stretches. Returns the lanes in which a stretch is
+/// beyond the limit, a bit each.
 #[inline(always)]
-pub(super) fn add_limit<S: Simd>(simd: S, limit: &StretchEnergy, f: &Mat3L<S>, p: &mut Mat3L<S>) -> bool {
+pub(super) fn add_limit<S: Simd>(simd: S, limit: &StretchEnergy, f: &Mat3L<S>, p: &mut Mat3L<S>) -> u16 {
     let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
     // Principal stretches are within the limit where 16 I - F'F is positive definite: where its
     // leading minors are positive (Sylvester).
@@ -141,14 +141,15 @@ pub(super) fn add_limit<S: Simd>(simd: S, limit: &StretchEnergy, f: &Mat3L<S>, p
     let least = simd.min_f32x16(simd.min_f32x16(first, second), third);
     let within = simd.simd_gt_f32x16(least, zero);
     if simd.all_true_mask32x16(within) {
-        return false;
+        return 0;
     }
     let mut acts = [0.0; LANES];
     simd.select_f32x16(within, zero, one).store_slice(&mut acts);
+    let beyond = (0..LANES).fold(0, |lanes, lane| lanes | u16::from(acts[lane] != 0.0) << lane);
     let (stretch, mut sum) = (stored(f), stored(p));
-    add_limit_to(limit, &acts, &stretch, &mut sum);
+    add_limit_to(limit, beyond, &stretch, &mut sum);
     *p = sum.map(|column| column.map(|numbers| load(simd, &numbers)));
-    true
+    beyond
 }
 
 /// Numbers of the lanes of a matrix.
@@ -161,16 +162,11 @@ fn stored<S: Simd>(m: &Mat3L<S>) -> [[[f32; LANES]; 3]; 3] {
     numbers
 }
 
-/// Adds it in the lanes where it `acts`.
+/// Adds it in the lanes `beyond` the limit.
 #[cold]
 #[inline(never)]
-fn add_limit_to(
-    limit: &StretchEnergy,
-    acts: &[f32; LANES],
-    f: &[[[f32; LANES]; 3]; 3],
-    sum: &mut [[[f32; LANES]; 3]; 3],
-) {
-    for lane in (0..LANES).filter(|lane| acts[*lane] != 0.0) {
+fn add_limit_to(limit: &StretchEnergy, beyond: u16, f: &[[[f32; LANES]; 3]; 3], sum: &mut [[[f32; LANES]; 3]; 3]) {
+    for lane in (0..LANES).filter(|lane| beyond >> lane & 1 != 0) {
         let f = DMat3::from_cols_array_2d(&f.map(|column| column.map(|numbers| f64::from(numbers[lane]))));
         let part = limit.stress(f).to_cols_array_2d();
         for (sum, part) in sum.as_flattened_mut().iter_mut().zip(part.as_flattened()) {

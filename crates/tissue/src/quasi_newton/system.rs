@@ -149,10 +149,9 @@ impl System {
     }
 
     fn set_update(&mut self, level: Level) {
-        let Self { factor: Some(factor), update, springs: ContactSprings { springs, .. }, right, .. } = self else {
-            return;
-        };
-        dispatch!(level, simd => update.set(simd, factor, right, springs));
+        if let Self { factor: Some(factor), update, springs: ContactSprings { springs, .. }, .. } = self {
+            update.set(level, factor, springs);
+        }
     }
 
     /// Turns the system with the tissue, nodes at `x`.
@@ -169,7 +168,7 @@ impl System {
         dispatch!(level, simd => {
             warp.to_rest(simd, direction, right);
             factor.forward(simd, right, precise);
-            update.apply(simd, right);
+            update.apply(level, right);
             factor.backward(simd, right, precise);
             warp.out_of_rest(simd, right, direction);
         });
@@ -199,7 +198,7 @@ impl System {
         }
         dispatch!(level, simd => {
             factor.forward(simd, right, true);
-            update.apply(simd, right);
+            update.apply(level, right);
             factor.backward(simd, right, true);
         });
         for (row, number) in x.iter_mut().zip(right.chunks_exact(3)) {

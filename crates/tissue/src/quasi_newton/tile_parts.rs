@@ -15,7 +15,7 @@ const MIN_TILES: usize = 6000;
 
 /// Parts are cut until there are so many, or the largest has less than a share of all tiles.
 const MAX_PARTS: usize = 8;
-const MIN_SHARE: f64 = 0.15;
+const MIN_SHARE: f64 = 0.25;
 
 /// The supernodes above the parts have at most this share of all tiles.
 const MAX_SHARE_ABOVE: f64 = 0.4;
@@ -99,9 +99,9 @@ impl Part {
         self.vector[self.numbers.len()..].fill(0.0);
     }
 
-    /// Takes the part's sums from the numbers above, `ranges` of `x`.
-    pub fn take_from(&self, ranges: &[Range<usize>], x: &mut [f32]) {
-        let mut sums = self.vector[self.above..].iter();
+    /// Takes the sums of one of the part's vectors from the numbers above, `ranges` of `x`.
+    pub fn take(&self, vector: &[f32], ranges: &[Range<usize>], x: &mut [f32]) {
+        let mut sums = vector[self.above..].iter();
         for range in ranges {
             x[range.clone()].iter_mut().zip(&mut sums).for_each(|(x, sum)| *x += sum);
         }

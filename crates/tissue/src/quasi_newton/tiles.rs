@@ -119,7 +119,7 @@ impl Tiles {
             });
         });
         for part in &parts.list {
-            part.take_from(&parts.numbers, x);
+            part.take(&part.vector, &parts.numbers, x);
             part.end(x);
         }
         for s in &parts.above {
@@ -149,30 +149,49 @@ impl Tiles {
         (self.buffer, self.parts) = (buffer, parts);
     }
 
-    /// Solves L y = x in place for an `x` that has numbers only in the chain of supernodes from
-    /// that of `number` up to the root, and is 0 elsewhere; precisely. Writes the numbers of these
-    /// supernodes to `ranges`.
+    /// Solves L y = x for an `x` that is 0 but for one `value`. The solution has numbers only in the
+    /// chain of supernodes from that of its `number` up to the root: writes those to `column`, and
+    /// the ranges of these supernodes' numbers to `ranges`. It is precise.
     #[inline(always)]
-    pub fn forward_chain<S: Simd>(&mut self, simd: S, number: usize, x: &mut [f32], ranges: &mut Vec<Range<usize>>) {
-        let (mut buffer, mut parts) = (std::mem::take(&mut self.buffer), std::mem::take(&mut self.parts));
+    pub fn forward_chain<S: Simd>(
+        &self,
+        simd: S,
+        (number, value): (usize, f32),
+        room: &mut ChainRoom,
+        column: &mut Vec<f32>,
+        ranges: &mut Vec<Range<usize>>,
+    ) {
+        let ChainRoom { x, part: of_part, buffer } = room;
         ranges.clear();
+        x[number] = value;
         let mut next = Some(self.tree.supernode_of(number));
-        if let Some(part) = parts.list.iter_mut().find(|part| part.numbers.contains(&number)) {
-            part.begin(x);
+        if let Some(part) = self.parts.list.iter().find(|part| part.numbers.contains(&number)) {
+            of_part.clear();
+            of_part.resize(part.vector.len(), 0.0);
+            of_part[number - part.numbers.start] = value;
             while let Some(s) = next.filter(|s| part.supernodes.contains(s)) {
-                self.eliminate(simd, &self.supernodes[s], &mut part.vector, &mut part.buffer, true);
+                self.eliminate(simd, &self.supernodes[s], of_part, buffer, true);
                 ranges.push(self.tree.numbers(s));
                 next = self.tree.parent(s);
             }
-            part.take_from(&parts.numbers, x);
-            part.end(x);
+            part.take(of_part, &self.parts.numbers, x);
+            x[part.numbers.clone()].copy_from_slice(&of_part[..part.numbers.len()]);
         }
         while let Some(s) = next {
-            self.eliminate(simd, &self.supernodes[s], x, &mut buffer, true);
+            self.eliminate(simd, &self.supernodes[s], x, buffer, true);
             ranges.push(self.tree.numbers(s));
             next = self.tree.parent(s);
         }
-        (self.buffer, self.parts) = (buffer, parts);
+        column.clear();
+        for range in ranges.iter() {
+            column.extend_from_slice(&x[range.clone()]);
+            x[range.clone()].fill(0.0);
+        }
+    }
+
+    /// Room for [`Self::forward_chain`] with a vector of so many `numbers`.
+    pub fn chain_room(&self, numbers: usize) -> ChainRoom {
+        ChainRoom { x: vec![0.0; numbers + TILE_SIZE], part: Vec::new(), buffer: vec![0.0; self.buffer.len()] }
     }
 
     /// y = inverse b, and the rows below lose their product with y.
@@ -290,6 +309,16 @@ fn sum_transposed<S: Simd>(simd: S, tiles: &[Tile], x: &[f32]) -> f32x16<S> {
         tile.add_transposed(simd, i32x16::truncate_from(f32x16::from_slice(simd, x)), &mut sums);
     }
     transpose_sum(simd, &sums)
+}
+
+/// Scratch memory of a solve along a chain.
+pub(super) struct ChainRoom {
+    /// A vector of a solve, all zero before and after.
+    x: Vec<f32>,
+    /// The part's vector.
+    part: Vec<f32>,
+    /// Room for the longest column of row tiles.
+    buffer: Vec<f32>,
 }
 
 /// The scales of a block's columns and rows.
