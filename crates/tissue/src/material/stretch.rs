@@ -148,7 +148,7 @@ fn beyond_along_one(c: DMat3) -> Option<DMat3> {
         let slope = (3.0 * largest - 2.0 * trace) * largest + minors;
         let step = at(largest) / slope;
         largest -= step;
-        if !(step > NEWTON_TOLERANCE * largest) {
+        if step <= NEWTON_TOLERANCE * largest {
             break;
         }
     }

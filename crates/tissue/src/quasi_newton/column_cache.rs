@@ -10,11 +10,13 @@ use super::tiles::ChainRoom;
 use crate::threads::{for_each, for_each_with, in_parts};
 use fearless_simd::{Level, dispatch};
 
-/// Greatest number of nodes.
+/// Greatest number of nodes in use.
 pub(super) const MAX_NODES: usize = 128;
 
-/// Greatest number of columns.
-pub(super) const MAX_COLUMNS: usize = 3 * MAX_NODES;
+/// Greatest number of nodes whose columns are kept: jaws that hold 270 nodes use other ones in each
+/// frame. And of columns.
+const MAX_PLACES: usize = 320;
+pub(super) const MAX_COLUMNS: usize = 3 * MAX_PLACES;
 
 /// Fewest nodes that are worth a thread of their own: to solve for their columns, and to multiply
 /// with them.
@@ -63,8 +65,8 @@ impl ColumnCache {
     /// An empty one.
     pub fn new() -> Self {
         Self {
-            known: Vec::with_capacity(MAX_NODES),
-            columns: vec![HalfColumns::default(); MAX_NODES],
+            known: Vec::with_capacity(MAX_PLACES),
+            columns: vec![HalfColumns::default(); MAX_PLACES],
             products: vec![0.0; MAX_COLUMNS * MAX_COLUMNS],
             used: Vec::with_capacity(MAX_NODES),
             cuts: Vec::with_capacity(MAX_PARTS),
@@ -93,7 +95,7 @@ impl ColumnCache {
         used.clear();
         for node in nodes {
             let place = known.iter().position(|other| other == node).unwrap_or_else(|| {
-                let place = if known.len() < MAX_NODES {
+                let place = if known.len() < MAX_PLACES {
                     known.push(*node);
                     known.len() - 1
                 } else {
@@ -142,7 +144,7 @@ impl ColumnCache {
         }
         let (columns, count) = (&*columns, known.len());
         // Of two fresh ones, the later one is multiplied with the earlier one.
-        let mut order = [0; MAX_NODES];
+        let mut order = [0; MAX_PLACES];
         fresh.iter().enumerate().for_each(|(k, fresh)| order[fresh.place] = k + 1);
         for_each(fresh, |Fresh { place, products, .. }| {
             let others = (0..count).filter(|other| order[*other] <= order[*place]);
@@ -228,5 +230,93 @@ impl ColumnCache {
                 columns[*place].subtract(std::array::from_fn(|c| shares[3 * place + c]), *first, y);
             });
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ColumnCache, MAX_NODES, MAX_PLACES};
+    use crate::Isa;
+    use crate::quasi_newton::factor::Factor;
+    use crate::{BodyDescription, ConstitutiveModel, Material, ModelBuilder};
+    use fearless_simd::dispatch;
+    use trocar_testing::blocks::block;
+
+    /// A factor whose tree is cut into parts.
+    fn factor() -> Factor {
+        let mesh = block([10, 10, 24], 2e-3);
+        let material = Material {
+            model: ConstitutiveModel::StableNeoHookean,
+            young_modulus: 12e3,
+            poisson_ratio: 0.45,
+            density: 1200.0,
+            viscosity: 0.0,
+        };
+        let mut builder = ModelBuilder::new();
+        let body = BodyDescription { name: "block".into(), mesh: &mesh, material, pinned: vec![], supports: vec![] };
+        builder.body(body).unwrap();
+        let model = builder.build().unwrap();
+        let mut factor = Factor::new(&model.bodies[0], 1e-2).unwrap();
+        let free = factor.order.len();
+        factor.set_step(&vec![1e-3; free], 1e-2);
+        assert!(factor.factorise(Isa::detect().level(), &vec![false; free], &vec![0.0; free]));
+        factor
+    }
+
+    /// Products with a vector are those of solves for a node, whichever nodes were used before, and
+    /// any number of threads has the same bits.
+    #[test]
+    fn columns_are_those_of_solves() {
+        let level = Isa::detect().level();
+        let mut factor = factor();
+        let free = factor.order.len();
+        let y: Vec<f32> = (0..3 * free + 16).map(|i| ((7 * i) % 11) as f32 - 5.0).collect();
+        let windows: Vec<Vec<u32>> = [0usize, 300, 700, 1100, 40]
+            .into_iter()
+            .map(|first| (0..MAX_NODES).map(|k| ((first + 3 * k) % free) as u32).collect())
+            .collect();
+        assert!(windows.len() * MAX_NODES > MAX_PLACES, "no place is used twice");
+        let run = |factor: &Factor| {
+            let mut cache = ColumnCache::new();
+            let mut results = Vec::new();
+            for nodes in &windows {
+                cache.use_nodes(level, factor, nodes);
+                let mut products = vec![0.0; cache.len()];
+                cache.multiply(level, &y, &mut products);
+                let own = |place: &usize| [0, 1, 2].map(|c| cache.products(*place, c)[3 * place + c]);
+                let of_used = cache.used().iter().map(|place| [0, 1, 2].map(|c| products[3 * place + c]));
+                let squares: Vec<_> = cache.used().iter().map(own).collect();
+                let mut rest = vec![0.0; y.len()];
+                cache.subtract(level, &vec![1e-3; cache.len()], &mut rest);
+                results.push((of_used.collect::<Vec<_>>(), squares, rest));
+            }
+            results
+        };
+        let results = run(&factor);
+        for threads in [1, 2, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            assert!(pool.install(|| run(&factor)) == results, "{threads} threads");
+        }
+        for (nodes, (products, squares, rest)) in windows.iter().zip(&results) {
+            let mut sum = vec![0.0f64; 3 * free];
+            for (k, node) in nodes.iter().enumerate() {
+                for c in 0..3 {
+                    let mut column = vec![0.0; 3 * free + 16];
+                    column[3 * *node as usize + c] = 1.0;
+                    dispatch!(level, simd => factor.forward(simd, &mut column, true));
+                    let dot = |with: &[f32]| -> f64 {
+                        column[..3 * free].iter().zip(with).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
+                    };
+                    let square = dot(&column);
+                    assert!((square - squares[k][c]).abs() < 1e-3 * square, "node {node}: {square} {:?}", squares[k]);
+                    let scale = (square * dot(&y).abs().max(1.0)).sqrt() + dot(&y).abs();
+                    assert!((dot(&y) - products[k][c]).abs() < 1e-3 * scale, "node {node}: {}", products[k][c]);
+                    sum.iter_mut().zip(&column).for_each(|(sum, x)| *sum += 1e-3 * f64::from(*x));
+                }
+            }
+            let most = sum.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+            let off = |k: usize| (f64::from(rest[k]) + sum[k]).abs();
+            assert!((0..3 * free).all(|k| off(k) < 1e-3 * most));
+        }
     }
 }

@@ -121,12 +121,12 @@ pub(super) fn max_coordinate(rows: &[Row]) -> f32 {
             let size = chunk[lane].abs();
             most[lane] = if size > most[lane] { size } else { most[lane] };
             // NaN if the number is not finite.
-            strange[lane] += size - size;
+            strange[lane] += 0.0 * size;
         }
     }
     for number in rest {
         most[0] = most[0].max(number.abs());
-        strange[0] += number - number;
+        strange[0] += 0.0 * number;
     }
     if strange == [0.0; LANES] { most.into_iter().fold(0.0, f32::max) } else { f32::INFINITY }
 }
