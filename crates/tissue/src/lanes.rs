@@ -166,8 +166,8 @@ pub(crate) fn rotation<S: Simd>(simd: S, f: &Mat3L<S>, least: f32) -> Mat3L<S> {
 /// rounding.
 const POLAR_TOLERANCE: f32 = 1e-7;
 
-/// Most rounds of the polar decomposition, and how many of them are scaled: enough for condition numbers
-/// up to a thousand.
+/// Most rounds of the polar decomposition, and how many of them are scaled: enough for condition
+/// numbers up to a thousand.
 const POLAR_ROUNDS: usize = 8;
 const SCALED_POLAR_ROUNDS: usize = 3;
 

@@ -22,8 +22,8 @@ pub(super) struct Elements {
     /// Volume ratios at the accepted positions, and at those of the last evaluation.
     pub ratios: Vec<[f32; LANES]>,
     pub trial: Vec<[f32; LANES]>,
-    /// Elements that are stretched beyond the limit at the last evaluation, a bit for each lane of a
-    /// batch; and whether there is any.
+    /// Elements that are stretched beyond the limit at the last evaluation, a bit for each lane of
+    /// a batch; and whether there is any.
     pub beyond: Vec<u16>,
     pub stretched: bool,
     /// The dashpots along their edges.

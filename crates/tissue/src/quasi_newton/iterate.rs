@@ -58,7 +58,8 @@ impl Iterate {
         }
     }
 
-    /// Loads positions and velocities from the state. Returns whether all nodes are where they were.
+    /// Loads positions and velocities from the state. Returns whether all nodes are where they
+    /// were.
     pub fn load(&mut self, layout: &Layout, state: &BodyState) -> bool {
         let mut same = true;
         for (x, vertex) in self.x.iter_mut().zip(&layout.vertex) {

@@ -143,7 +143,7 @@ impl LowRankUpdate {
     fn build(&mut self, level: Level) {
         let Self { springs, places, columns, matrix, .. } = self;
         let (n, columns) = (springs.len(), &*columns);
-        let ends = if n < MIN_PARTED { [1.0, 1.0, 1.0, 1.0] } else { EVEN_ENDS };
+        let (ends, used) = if n < MIN_PARTED { ([1.0; 4], 1) } else { (EVEN_ENDS, EVEN_ENDS.len()) };
         let mut parts: [(usize, &mut [f64]); EVEN_ENDS.len()] = Default::default();
         let (mut rest, mut first) = (&mut matrix[..n * n], 0);
         for (part, end) in parts.iter_mut().zip(ends) {
@@ -152,7 +152,6 @@ impl LowRankUpdate {
             *part = (first, numbers);
             (rest, first) = (others, end);
         }
-        let used = if n < MIN_PARTED { 1 } else { parts.len() };
         for_each(&mut parts[..used], |(first, numbers)| {
             let mut of_columns = [0.0; MAX_COLUMNS];
             let of_columns = &mut of_columns[..columns.len()];
