@@ -48,8 +48,8 @@ impl Stiffened {
 }
 
 impl Elements {
-    /// Finds the stiffened elements at the positions `x` of the last evaluation, the stiffest first;
-    /// `held` nodes are not free.
+    /// Finds the stiffened elements at the positions `x` of the last evaluation, the stiffest
+    /// first; `held` nodes are not free.
     pub fn find_stiffened(&self, layout: &Layout, x: &[Row], held: &[bool], found: &mut Vec<Stiffened>) {
         found.clear();
         let mut keep = |element: Stiffened| {

@@ -149,9 +149,9 @@ impl Tiles {
         (self.buffer, self.parts) = (buffer, parts);
     }
 
-    /// Solves L y = x, precisely, for an `x` that is 0 but for one `value`. The solution has numbers
-    /// only in the chain of supernodes from that of its `number` up to the root: writes those to
-    /// `column`, and the ranges of these supernodes' numbers to `ranges`.
+    /// Solves L y = x, precisely, for an `x` that is 0 but for one `value`. The solution has
+    /// numbers only in the chain of supernodes from that of its `number` up to the root: writes
+    /// those to `column`, and the ranges of these supernodes' numbers to `ranges`.
     #[inline(always)]
     pub fn forward_chain<S: Simd>(
         &self,
