@@ -161,7 +161,8 @@ fn volumes<S: Simd>(simd: S, elements: &[Elements], x: &[Row], left: usize) -> S
         let second = sub(gather(simd, x, &batch.corners[2]), origin);
         let third = sub(gather(simd, x, &batch.corners[3]), origin);
         let ratio = dot(cross(first, second), third) * load(simd, &batch.inverse_6v);
-        least = simd.min_f32x16(least, ratio);
+        // Processors differ in the smaller of a number and NaN.
+        least = simd.select_f32x16(simd.simd_lt_f32x16(ratio, least), ratio, least);
         if simd.any_true_mask32x16(simd.simd_le_f32x16(ratio, zero)) {
             let mut ratios = [0.0; LANES];
             ratio.store_slice(&mut ratios);

@@ -138,8 +138,8 @@ pub(super) fn add_limit<S: Simd>(simd: S, limit: &StretchEnergy, f: &Mat3L<S>, p
     let [xy, yz, zx] = [dot(f[0], f[1]), dot(f[1], f[2]), dot(f[2], f[0])];
     let (second, first) = (xx * yy - xy * xy, xx);
     let third = zz * second - (xx * yz * yz + yy * zx * zx + (xy + xy) * (yz * zx));
-    let least = simd.min_f32x16(simd.min_f32x16(first, second), third);
-    let within = simd.simd_gt_f32x16(least, zero);
+    let [first, second, third] = [first, second, third].map(|minor| simd.simd_gt_f32x16(minor, zero));
+    let within = first & second & third;
     if simd.all_true_mask32x16(within) {
         return 0;
     }
