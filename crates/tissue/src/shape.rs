@@ -209,3 +209,69 @@ fn sum_of_parts<T: Sync>(batches: &[T], of: impl Fn(usize, &[T]) -> Shape + Send
     });
     parts.into_iter().fold(Shape::NONE, Shape::with)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{STRETCH_LIMIT, ShapeMeter};
+    use crate::state::BodyState;
+    use crate::{Body, BodyDescription, ConstitutiveModel, Material, ModelBuilder};
+    use glam::Vec3A;
+    use trocar_core::Random;
+    use trocar_testing::blocks::block;
+
+    fn body(cells: [usize; 3]) -> Body {
+        let mesh = block(cells, 2e-3);
+        let material = Material {
+            model: ConstitutiveModel::StableNeoHookean,
+            young_modulus: 12e3,
+            poisson_ratio: 0.45,
+            density: 1200.0,
+            viscosity: 0.0,
+        };
+        let mut builder = ModelBuilder::new();
+        builder
+            .body(BodyDescription { name: "block".into(), mesh: &mesh, material, pinned: vec![], supports: vec![] })
+            .unwrap();
+        builder.build().unwrap().bodies[0].clone()
+    }
+
+    /// Elements in lanes are counted as one by one, in bodies of any size: as many threads as they
+    /// are worth, and a last batch that is not full.
+    #[test]
+    fn elements_and_edges_are_those_counted_one_by_one() {
+        for cells in [[1, 1, 1], [3, 3, 5], [16, 16, 20]] {
+            let body = body(cells);
+            let mut meter = ShapeMeter::new(&body);
+            let mut state = BodyState::at_rest(&body);
+            let shape = meter.measure(&body, &state);
+            assert!(shape.finite && !shape.stretched && shape.inverted == 0);
+            assert!((shape.min_volume_ratio - 1.0).abs() < 1e-4, "{}", shape.min_volume_ratio);
+
+            let random = Random::from_keys(&[cells[2] as u64]);
+            for (k, x) in state.x.iter_mut().enumerate() {
+                let by = [0, 1, 2].map(|c| 0.8e-3 * random.normal(3 * k as u64 + c) as f32);
+                *x += Vec3A::from(by);
+            }
+            let ratios: Vec<f64> = body
+                .tets
+                .iter()
+                .zip(&body.volumes)
+                .map(|(tet, volume)| {
+                    let [a, b, c, d] = tet.map(|i| state.x[i as usize].as_dvec3());
+                    (b - a).cross(c - a).dot(d - a) / 6.0 / volume
+                })
+                .collect();
+            let shape = meter.measure(&body, &state);
+            assert_eq!(shape.inverted, ratios.iter().filter(|ratio| **ratio <= 0.0).count(), "{cells:?}");
+            let least = ratios.iter().fold(f64::INFINITY, |least, ratio| least.min(*ratio));
+            assert!((shape.min_volume_ratio - least).abs() < 1e-4, "{} {least}", shape.min_volume_ratio);
+            assert!(!shape.stretched);
+
+            let last = state.x.len() - 1;
+            state.x[last] += Vec3A::X * 2e-3 * STRETCH_LIMIT * 2.0;
+            assert!(meter.measure(&body, &state).stretched);
+            state.x[last].y = f32::NAN;
+            assert!(!meter.measure(&body, &state).finite);
+        }
+    }
+}
