@@ -131,7 +131,6 @@ fn beyond(squares: DVec3) -> DVec3 {
 }
 
 /// (C - 16 I)+ if C has one eigenvalue above 16; None if it has others, or two that are too close.
-/// It takes a tenth of the time of all eigenvectors.
 ///
 /// Newton's method from above finds the largest eigenvalue c of a symmetric matrix without passing
 /// it. The adjugate of C - c I is a multiple of the projection onto its eigenvector.
