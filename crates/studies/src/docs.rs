@@ -1,16 +1,19 @@
-//! Tables for the docs: Markdown files that say which command, commit and schema made them.
+//! Tables for the docs: Markdown files that say which command, commit, machine and schema made
+//! them.
 
+use crate::machine::Machine;
 use crate::registry::STUDIES;
 use crate::study::Entry;
 
-/// The content of a file: a first line with study, schema and commit, then the command, then the
-/// table.
+/// The content of a file: a first line with study, schema and commit, then the command and the
+/// machine, then the table.
 pub fn page(entry: &dyn Entry, command: &str, commit: &str, body: &str) -> String {
     let (kind, name) = (entry.kind().name(), entry.name());
     format!(
         "<!-- trocar {kind} {name}; schema {}; commit {commit} -->\n\nMeasured by `{command}` at commit \
-         {commit}.\n\n{body}",
-        entry.schema()
+         {commit}, on {}.\n\n{body}",
+        entry.schema(),
+        Machine::here().name()
     )
 }
 

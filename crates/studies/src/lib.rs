@@ -7,6 +7,7 @@
 mod bench;
 pub mod docs;
 mod experiment;
+mod machine;
 pub mod names;
 pub mod registry;
 pub mod scenes;

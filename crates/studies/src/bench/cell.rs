@@ -4,8 +4,8 @@
 //! without contact between organs gets the same actions, alternating with the first. The difference
 //! is the cost of that contact.
 
-use super::machine::{Machine, Setup};
 use crate::Result;
+use crate::machine::{Machine, Setup};
 use crate::names::SceneChoice;
 use crate::statistics::median;
 use crate::study::{Job, Kind, Study};

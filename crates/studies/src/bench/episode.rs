@@ -3,7 +3,7 @@
 //! The scripted controller performs the task of the scene. All runs use the same seed and do the
 //! same work.
 
-use super::machine::{Machine, Setup};
+use crate::machine::{Machine, Setup};
 use crate::names::SceneChoice;
 use crate::statistics::median;
 use crate::study::{Job, Kind, Study};

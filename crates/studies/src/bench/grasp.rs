@@ -9,7 +9,7 @@
 //!
 //! With the friction design the run without contact holds nothing.
 
-use super::machine::{Machine, Setup};
+use crate::machine::{Machine, Setup};
 use crate::names::{AppendixChoice, DesignName, design_name};
 use crate::statistics::median;
 use crate::study::{Job, Kind, Study};

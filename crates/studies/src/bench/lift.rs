@@ -1,8 +1,8 @@
 //! Cost of a whole organ in the jaws: the grasp-lift of one organ, from the first contact of the
 //! jaws to their release, beside a frame of *drag* of six organs with as many elements.
 
-use super::machine::Machine;
 use super::timing::Timing;
+use crate::machine::Machine;
 use crate::names::Units;
 use crate::scenes::{BenchScene, FRAME, Organ, Organs, Run, ellipsoid, material};
 use crate::statistics::median;

@@ -6,7 +6,6 @@ mod episode;
 mod grasp;
 mod instances;
 mod lift;
-mod machine;
 mod many;
 mod meshing;
 mod organs;

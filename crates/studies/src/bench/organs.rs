@@ -1,7 +1,7 @@
 //! Speed and error of stepping organs: one schedule on one mesh.
 
-use super::machine::Machine;
 use super::timing::Timing;
+use crate::machine::Machine;
 use crate::names::{SolverName, kilopascals};
 use crate::scenes::{BenchScene, FRAME, OracleRun, Organs, Run, material, mean_error, rest_positions, rms_error};
 use crate::statistics::median;

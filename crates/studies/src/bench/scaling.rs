@@ -1,8 +1,8 @@
 //! Speed of stepping over the number of elements, over threads, and for many small models.
 
-use super::machine::Machine;
 use super::many::{self, ManyRow};
 use super::timing::Timing;
+use crate::machine::Machine;
 use crate::scenes::{BenchScene, Organs, Run, material};
 use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};

@@ -5,7 +5,7 @@
 //! that takes 60 frames a second. At real time, frames are counted and measured. An operator then
 //! moves an instrument with commands at 60 Hz.
 
-use super::machine::Machine;
+use crate::machine::Machine;
 use crate::names::SceneChoice;
 use crate::statistics::{median, percentile};
 use crate::study::{Job, Kind, Study};

@@ -6,7 +6,7 @@ mod card;
 mod page;
 mod scene;
 
-use super::machine::Machine;
+use crate::machine::Machine;
 use crate::scenes::rms_error;
 use crate::statistics::median;
 use crate::study::{Job, Kind, Study};

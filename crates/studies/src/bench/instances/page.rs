@@ -17,11 +17,10 @@ const BAR: (usize, usize, f64, f64) = (1_024, 600, 20.0, 4.0);
 pub(super) fn document(result: &ManyResult) -> Result<Document> {
     let lead = format!(
         "Ceca on one lattice, each with its own modulus, pose and path of the jaws that lift it. {} substeps a \
-         frame of 1/60 s, {} threads, {} kernels; {}. Error: RMS distance from the converged solution of the same \
+         frame of 1/60 s, {} threads; {}. Error: RMS distance from the converged solution of the same \
          substeps over RMS displacement.",
         result.substeps,
         result.threads,
-        result.isa,
         result.machine.described()
     );
     let (instances, nodes, rate, cheaper) = BAR;

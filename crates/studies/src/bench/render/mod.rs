@@ -5,8 +5,8 @@ mod rays;
 
 pub use rays::RayRow;
 
-use super::machine::Machine;
 use crate::Result;
+use crate::machine::Machine;
 use crate::scenes::{LaparoscopicScene, endoscope_view};
 use crate::statistics::median;
 use crate::study::{Job, Kind, Study};
