@@ -1,7 +1,8 @@
 //! Colour, depth and mask images, and their files.
 
 use crate::{Error, Result};
-use image::{DynamicImage, ImageDecoder, ImageReader};
+use image::codecs::jpeg::JpegEncoder;
+use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageReader};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -10,6 +11,9 @@ const MAX_SIDE: u32 = 16_384;
 
 /// Maximum number of pixel bytes per file byte. Deflate reaches 1032.
 const MAX_COMPRESSION: u64 = 1040;
+
+/// JPEG quality (0 to 100), without visible blocks.
+const JPEG_QUALITY: u8 = 90;
 
 /// An 8-bit sRGB image, rows from the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -82,6 +86,25 @@ impl ColorImage {
     /// A number of pixels that does not match the size.
     pub fn to_png(&self) -> Result<Vec<u8>> {
         encode(self.width, self.height, png::ColorType::Rgb, png::BitDepth::Eight, self.pixels.as_flattened())
+    }
+
+    /// Writes a JPEG without visible blocks.
+    ///
+    /// # Errors
+    /// A file that cannot be written; a number of pixels that does not match the size.
+    pub fn write_jpeg(&self, path: &Path) -> Result<()> {
+        let wrong = || Error::Camera(format!("a {} x {} image cannot be a JPEG", self.width, self.height));
+        let (Ok(width), Ok(height)) = (u32::try_from(self.width), u32::try_from(self.height)) else {
+            return Err(wrong());
+        };
+        if self.pixels.len() != self.width * self.height {
+            return Err(wrong());
+        }
+        let mut bytes = Vec::new();
+        JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY)
+            .write_image(self.pixels.as_flattened(), width, height, ExtendedColorType::Rgb8)
+            .map_err(|_| wrong())?;
+        write(path, &bytes)
     }
 }
 
@@ -264,6 +287,20 @@ mod tests {
         mask.set[4] = true;
         mask.write_png(&path).unwrap();
         assert_eq!(Mask::read(&path).unwrap(), mask);
+    }
+
+    #[test]
+    fn a_jpeg_is_near_the_picture() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("image.jpg");
+        let mut picture = ColorImage::new(48, 32, [200, 60, 40]);
+        picture.write_jpeg(&path).unwrap();
+        let back = ColorImage::read(&path).unwrap();
+        assert_eq!((back.width, back.height), (48, 32));
+        let farthest = back.pixels.iter().flat_map(|p| (0..3).map(|c| p[c].abs_diff(picture.pixels[0][c]))).max();
+        assert!(farthest.unwrap() <= 3, "{farthest:?}");
+        picture.pixels.pop();
+        assert!(picture.write_jpeg(&path).is_err());
     }
 
     #[test]

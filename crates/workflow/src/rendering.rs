@@ -69,7 +69,7 @@ pub struct Rendering {
 }
 
 impl Rendering {
-    /// Renders a picture (`.png`) or a video (`.webp`, `.mp4`) to `output`.
+    /// Renders a picture (`.png`, `.jpg`) or a video (`.webp`, `.mp4`) to `output`.
     ///
     /// # Errors
     /// One line that names the source, camera, option or file that is wrong.
@@ -77,13 +77,13 @@ impl Rendering {
         let extension = output.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
         let wrong = |reason: &str| Err(Error::Mismatch(format!("{}: {reason}", output.display())));
         let max_hz = match extension.as_str() {
-            "png" => None,
+            "png" | "jpg" | "jpeg" => None,
             "webp" => Some(WEBP_HZ),
             "mp4" => Some(MP4_HZ),
-            _ => return wrong("a picture must end in .png, a video in .webp or .mp4"),
+            _ => return wrong("a picture must end in .png or .jpg, a video in .webp or .mp4"),
         };
         if max_hz.is_some() && (self.depth || self.labels || self.at.is_some() || self.cut_away) {
-            return wrong("--depth, --labels, --at and --cut-away are only for pictures (.png)");
+            return wrong("--depth, --labels, --at and --cut-away are only for pictures (.png, .jpg)");
         }
         if let Some(at) = self.at.filter(|at| !(0.0..=600.0).contains(at)) {
             return Err(Error::Mismatch(format!("--at is {at} s; it must be in [0, 600]")));
@@ -302,7 +302,11 @@ impl Rendering {
         let stem = output.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let beside = |what: &str| output.with_file_name(format!("{stem}-{what}.png"));
         let mut files = vec![output.to_owned()];
-        picture.color.write_png(output)?;
+        if output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+            picture.color.write_png(output)?;
+        } else {
+            picture.color.write_jpeg(output)?;
+        }
         if self.depth {
             files.extend([beside("depth"), beside("depth-shown")]);
             picture.depth.write_png(&files[files.len() - 2], DEPTH_STEP)?;

@@ -12,7 +12,7 @@ pub struct Render {
     /// recording) and outside. By default the first.
     #[arg(long)]
     pub camera: Option<String>,
-    /// Picture (.png) or video (.webp, or .mp4 by ffmpeg) to write.
+    /// Picture (.png, .jpg) or video (.webp, or .mp4 by ffmpeg) to write.
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Path tracing instead of only direct light.
