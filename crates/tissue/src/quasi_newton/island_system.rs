@@ -11,6 +11,11 @@ const LIMIT_SHARE: f32 = 0.02;
 /// The correction of a body at rest is at most this share of its free fall in a substep.
 const STILL_SHARE: f32 = 1e-4;
 
+/// A correction in each substep is an acceleration. One above this (m/s2), a thousandth of Earth's
+/// gravity, ends no search. Without this limit, tissue in substeps shorter than a millisecond would
+/// come to rest before it has sagged: there a fixed distance is a large force.
+const MAX_LEFT: f32 = 0.01;
+
 /// Bodies that may touch each other, in a frame.
 pub(super) type IslandSystem<'a> = IslandFrame<'a, QuasiNewtonSolver>;
 
@@ -92,7 +97,8 @@ impl IslandSystem<'_> {
 
     /// The correction that ends a search (m); rounding of positions is none.
     pub fn tolerance(&mut self) -> f32 {
-        (self.slots[0].solver.settings.tolerance as f32).max(self.rounding())
+        let tolerance = self.slots[0].solver.settings.tolerance as f32;
+        tolerance.max(self.rounding()).min(MAX_LEFT * self.h * self.h)
     }
 
     /// A body comes to rest if it goes no farther freely in a substep, and its correction is no
