@@ -7,10 +7,11 @@ use crate::names::Units;
 use crate::scenes::{BenchScene, FRAME, Organ, Organs, Run, ellipsoid, material};
 use crate::statistics::median;
 use crate::study::{Job, Kind, Study};
+use crate::trials::{Outcomes, Resumed, resumed};
 use crate::{Error, Result};
 use clap::Args;
 use glam::DVec3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use trocar_core::Progress;
 use trocar_geometry::io::{Unit, write_ply};
@@ -74,7 +75,7 @@ pub struct LiftBench {
 }
 
 /// Times of a phase.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PhaseTiming {
     /// Name of the phase.
     pub phase: String,
@@ -89,7 +90,7 @@ pub struct PhaseTiming {
 }
 
 /// One organ.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LiftRow {
     /// Name of the organ.
     pub organ: String,
@@ -136,6 +137,8 @@ pub struct LiftResult {
     pub skipped: Vec<String>,
     /// The machine.
     pub machine: Machine,
+    /// Organs of an earlier run on this machine.
+    pub resumed: Resumed,
 }
 
 /// A surface file.
@@ -156,7 +159,7 @@ impl Study for LiftBench {
     const NAME: &'static str = "lift";
     const KIND: Kind = Kind::Bench;
     const FOLDER: Option<&'static str> =
-        Some("Folder of the report and of the organs' specimens. Finished specimens in it are used again.");
+        Some("Folder of the report and of the organs' specimens. Finished organs in it are used again.");
     type Figures = LiftResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(LiftResult, Document)> {
@@ -164,17 +167,17 @@ impl Study for LiftBench {
         job.claim()?;
         let (surfaces, skipped) = self.surfaces(job)?;
         let threads = if self.threads == 0 { machine.cores } else { self.threads };
-        let rows = surfaces
-            .iter()
-            .map(|Surface { name, path, unit }| {
+        let settings = format!("{threads} {} {:?} {}", self.rounds, self.units, machine.name());
+        let key = |surface: &Surface| surface.path.display().to_string();
+        let Outcomes { rows, resumed } =
+            job.trials("organs", &settings, &surfaces, key, 1, |Surface { name, path, unit }, progress| {
                 let folder = job.output().join("specimens").join(name);
                 if !folder.is_dir() {
-                    reconstruct_surface(path, *unit, &Default::default(), &folder, job.progress)?;
+                    reconstruct_surface(path, *unit, &Default::default(), &folder, progress)?;
                 }
-                row(name, &Specimen::read(&folder)?, &folder, (threads, self.rounds), job.progress)
-            })
-            .collect::<Result<Vec<_>>>()?;
-        let result = LiftResult { rows, threads, skipped, machine };
+                row(name, &Specimen::read(&folder)?, &folder, (threads, self.rounds), progress)
+            })?;
+        let result = LiftResult { rows, threads, skipped, machine, resumed };
         let document = document(&result);
         Ok((result, document))
     }
@@ -381,7 +384,8 @@ fn document(r: &LiftResult) -> Document {
     let lead = "From the first contact of the jaws to their release. The time of a frame is its median over the \
                 rounds. Six: a frame of drag of six organs with as many elements in all.";
     let machine = format!("{} threads on {}", r.threads, r.machine.described());
+    let said = r.skipped.iter().cloned().chain(resumed(&r.resumed, "organs")).chain([machine]);
     Document::new("Lift", "Cost of one whole organ in the jaws")
-        .with(Section::new("Organs", lead).table(table).lines(r.skipped.iter().cloned().chain([machine])))
+        .with(Section::new("Organs", lead).table(table).lines(said))
         .with(Section::new("Phases", "").table(phases))
 }
