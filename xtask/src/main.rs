@@ -39,7 +39,7 @@ const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests, 
        cargo xtask docs          the API documentation, and the book in target/book where mdbook is installed
        cargo xtask tools         fetch the programs and libraries that some tests compare with (test does this too)
        cargo xtask peers         our stepping beside Newton and MuJoCo on one mesh (peers from PyPI; scripts from ../shared/peers)
-       cargo xtask figures [NAME...]  run studies and write their tables into docs/generated; all that are there by default
+       cargo xtask figures [NAME...]  tables of studies, files in docs/pictures, 'pictures' or 'learning'; all by default (hours)
        cargo xtask aarch64       the same bits on 64-bit ARM, in an emulator (skipped without qemu and a cross-compiler)
        cargo xtask fuzz [CASES]  damaged files against every reader, a million cases by default";
 
