@@ -28,8 +28,8 @@ enum Source {
     Task(&'static str, &'static str),
     /// Words of `trocar bench render`.
     Bench(&'static str),
-    /// Figures of the page of a study that has a table: how the titles of their sections begin (none
-    /// for all), and how their names do.
+    /// Figures of the page of a study that has a table: how the titles of their sections begin
+    /// (none for all), and how their names do.
     Study(&'static str, &'static [&'static str], &'static [&'static str]),
     /// A surface of `DATA`: the lift of its organ.
     Lift(&'static str),
