@@ -93,18 +93,7 @@ impl ColorImage {
     /// # Errors
     /// A file that cannot be written; a number of pixels that does not match the size.
     pub fn write_jpeg(&self, path: &Path) -> Result<()> {
-        let wrong = || Error::Camera(format!("a {} x {} image cannot be a JPEG", self.width, self.height));
-        let (Ok(width), Ok(height)) = (u32::try_from(self.width), u32::try_from(self.height)) else {
-            return Err(wrong());
-        };
-        if self.pixels.len() != self.width * self.height {
-            return Err(wrong());
-        }
-        let mut bytes = Vec::new();
-        JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY)
-            .write_image(self.pixels.as_flattened(), width, height, ExtendedColorType::Rgb8)
-            .map_err(|_| wrong())?;
-        write(path, &bytes)
+        write(path, &jpeg(self.pixels.as_flattened(), self.width, self.height)?)
     }
 }
 
@@ -252,6 +241,24 @@ fn encode(width: usize, height: usize, color: png::ColorType, depth: png::BitDep
     let mut writer = encoder.write_header().map_err(failed)?;
     writer.write_image_data(bytes).map_err(failed)?;
     writer.finish().map_err(failed)?;
+    Ok(out)
+}
+
+/// A JPEG of `bytes`, three a pixel, without visible blocks.
+///
+/// # Errors
+/// A number of bytes that does not match the size; sides that a JPEG cannot have.
+pub fn jpeg(bytes: &[u8], width: usize, height: usize) -> Result<Vec<u8>> {
+    let wrong = || Error::Camera(format!("{} bytes cannot be a JPEG of {width} x {height} pixels", bytes.len()));
+    let (Ok(wide), Ok(high)) = (u32::try_from(width), u32::try_from(height)) else {
+        return Err(wrong());
+    };
+    if bytes.len() != 3 * width * height {
+        return Err(wrong());
+    }
+    let mut out = Vec::new();
+    let encoder = JpegEncoder::new_with_quality(&mut out, JPEG_QUALITY);
+    encoder.write_image(bytes, wide, high, ExtendedColorType::Rgb8).map_err(|_| wrong())?;
     Ok(out)
 }
 

@@ -32,7 +32,7 @@ pub use depth_noise::DepthNoise;
 pub use distortion::{Distortion, Fisheye};
 pub use endoscope::Endoscope;
 pub use error::{Error, Result};
-pub use images::{ColorImage, DepthImage, Mask, pixel_neighbours};
+pub use images::{ColorImage, DepthImage, Mask, jpeg, pixel_neighbours};
 pub use lens::{CameraModel, UndistortionMap};
 pub use model::Camera;
 pub use raster::draw_triangle;

@@ -3,18 +3,12 @@
 use crate::page;
 use crate::{Error, Result};
 use base64::{Engine, engine::general_purpose::STANDARD};
-use image::codecs::{
-    jpeg::JpegEncoder,
-    png::{CompressionType, FilterType, PngEncoder},
-};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, RgbImage, imageops};
-use trocar_camera::ColorImage;
+use trocar_camera::{ColorImage, jpeg};
 
 /// Maximum width (px): a page shows at most 1100 CSS pixels.
 const MAX_WIDTH: u32 = 1280;
-
-/// JPEG quality (0 to 100), without visible blocks.
-const JPEG_QUALITY: u8 = 90;
 
 /// An `<img>` of `picture`; `alt` is plain text. PNG if it is small, else JPEG.
 ///
@@ -29,8 +23,8 @@ pub fn img(picture: &ColorImage, alt: &str) -> Result<String> {
         rgb
     };
     let (width, height) = rgb.dimensions();
-    let mut jpeg = Vec::new();
-    JpegEncoder::new_with_quality(&mut jpeg, JPEG_QUALITY).write_image(&rgb, width, height, ExtendedColorType::Rgb8)?;
+    let jpeg =
+        jpeg(rgb.as_raw(), width as usize, height as usize).map_err(|wrong| Error::Mismatch(wrong.to_string()))?;
     let (kind, bytes) = small_png(&rgb, jpeg.len())?.map_or(("jpeg", jpeg), |png| ("png", png));
     Ok(img_of_bytes(kind, &bytes, width as usize, height as usize, alt))
 }

@@ -1,5 +1,5 @@
 //! What policies learn: the examples in Python record demonstrations, train on them, and are
-//! evaluated on unseen episodes. It takes about two hours on two cores.
+//! evaluated on unseen episodes. It takes about an hour.
 
 use super::{Trocar, WORK, absolute, tables, write};
 use serde_json::Value;
@@ -71,10 +71,15 @@ fn evaluate(trocar: &Trocar, python: &Python, cloned: &str) -> Result<String, St
     }
 }
 
+/// The commit of the repository.
+fn commit() -> String {
+    let run = Command::new("git").args(["rev-parse", "--short=8", "HEAD"]).output();
+    run.map_or_else(|_| "unknown".to_owned(), |o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
+}
+
 /// The first lines of the table.
 fn head() -> String {
-    let run = Command::new("git").args(["rev-parse", "--short=8", "HEAD"]).output();
-    let commit = run.map_or_else(|_| "unknown".to_owned(), |o| String::from_utf8_lossy(&o.stdout).trim().to_owned());
+    let commit = commit();
     format!(
         "<!-- cargo xtask figures learning; commit {commit} -->\n\nThe commands of `cargo xtask figures learning` at commit \
          {commit}: {EPISODES} unseen episodes of each policy, all on the same seeds.\n\n"
@@ -112,7 +117,8 @@ struct Python {
 
 impl Python {
     fn new() -> Result<Self, String> {
-        let folder = absolute(&Path::new(WORK).join(super::LEARNING))?;
+        // Of this commit: what another program recorded or trained is not used again.
+        let folder = absolute(&Path::new(WORK).join(format!("{}-{}", super::LEARNING, commit())))?;
         std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
         let python = Self { program: absolute(&Path::new(ENVIRONMENT).join("bin/python"))?, folder };
         let made = Command::new("python3").args(["-m", "venv", ENVIRONMENT]).status();

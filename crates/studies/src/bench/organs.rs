@@ -343,7 +343,7 @@ fn document(r: &OrgansResult) -> Document {
     );
     let lines = [
         format!(
-            "{}: {} organs, {} nodes, {} tets; schedule '{}' ({} substeps), {} threads, {} kernels ({})",
+            "{}: {} organs, {} nodes, {} tets; schedule '{}' ({} substeps), {} threads on {}",
             r.mesh,
             r.organs,
             r.nodes,
@@ -351,7 +351,6 @@ fn document(r: &OrgansResult) -> Document {
             r.schedule,
             r.substeps,
             r.threads,
-            r.isa,
             r.machine.described()
         ),
         format!(

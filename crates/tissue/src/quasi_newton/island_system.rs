@@ -11,10 +11,10 @@ const LIMIT_SHARE: f32 = 0.02;
 /// The correction of a body at rest is at most this share of its free fall in a substep.
 const STILL_SHARE: f32 = 1e-4;
 
-/// A correction in each substep is an acceleration. One above this (m/s2), a thousandth of Earth's
-/// gravity, ends no search. Without this limit, tissue in substeps shorter than a millisecond would
-/// come to rest before it has sagged: there a fixed distance is a large force.
-const MAX_LEFT: f32 = 0.01;
+/// The tolerance in each substep is an acceleration of at most this (m/s2), a thousandth of Earth's
+/// gravity. In substeps shorter than a millisecond a fixed distance is a large force, and tissue
+/// would come to rest before it has sagged.
+const TOLERATED_ACCELERATION: f32 = 0.01;
 
 /// Bodies that may touch each other, in a frame.
 pub(super) type IslandSystem<'a> = IslandFrame<'a, QuasiNewtonSolver>;
@@ -98,7 +98,7 @@ impl IslandSystem<'_> {
     /// The correction that ends a search (m); rounding of positions is none.
     pub fn tolerance(&mut self) -> f32 {
         let tolerance = self.slots[0].solver.settings.tolerance as f32;
-        tolerance.max(self.rounding()).min(MAX_LEFT * self.h * self.h)
+        tolerance.max(self.rounding()).min(TOLERATED_ACCELERATION * self.h * self.h)
     }
 
     /// A body comes to rest if it goes no farther freely in a substep, and its correction is no
