@@ -1,45 +1,49 @@
-//! Tissue that cannot move: the triangles of organs whose three vertices are pinned. Of a collision
-//! surface these are vertices whose nodes are all pinned.
+//! Tissue that cannot move: the triangles, edges and vertices of organs whose vertices are all
+//! pinned. Of a collision surface these are vertices whose nodes are all pinned.
 //!
-//! The tissue's own step finds contacts of vertices that move. It has none for pinned vertices, so
-//! such a triangle would let an instrument pass. Here it is a solid for the instrument's axis on
-//! its outer side, with no margin: an instrument that lies beside it is not touched. Triangles with
-//! a vertex that moves belong to the tissue's contact, so no force counts twice. Tissue at the rim
-//! of the pinned part, and not in front of it, is also left to the tissue's contact.
+//! The tissue's own step finds contacts of points that move. It has none for pinned ones, so they
+//! would let an instrument pass. Here they are solids for the instrument's axis on their outer
+//! side, with no margin: an instrument that lies beside them is not touched. Triangles with a
+//! vertex that moves belong to the tissue's contact, whose stiffness falls to 0 at a pinned vertex
+//! and at an edge between two. At the rim of the pinned part these are solids of their own.
 
 use super::meeting::{Deepest, Meeting, REACH};
 use super::rod::Rod;
 use crate::World;
 use crate::cell::ContactParts;
 use glam::DVec3;
+use std::collections::BTreeMap;
 use trocar_geometry::{closest_on_triangle, nearest_of_segments};
 use trocar_tissue::{CollisionSurface, Hole};
 
-/// Least cosine of the angle between a triangle's normal and the direction in which it pushes.
+/// Least cosine of the angle between a feature's normal and the direction in which it pushes.
 const LEAST_COSINE: f64 = 0.5;
 
 /// Share of a rod's radius by which it may come into tissue. An axis that came near the surface
 /// would get past the edge between two triangles, because a part is pushed by one triangle only.
 const ROOM: f64 = 0.5;
 
-/// Most triangles of a leaf.
+/// Most features of a leaf.
 const LEAF: usize = 4;
 
-/// The pinned triangles of all organs, in a tree of boxes.
+/// The pinned features of all organs' surfaces, in a tree of boxes.
 #[derive(Clone, Debug, Default)]
 pub(in crate::cell) struct PinnedSurface {
     /// In the tree's order.
-    triangles: Vec<Pinned>,
+    features: Vec<Pinned>,
     nodes: Vec<Node>,
 }
 
-/// A triangle of an organ whose vertices are pinned.
+/// A triangle of an organ whose vertices are pinned; or an edge or a vertex at the rim, as a
+/// triangle whose last corners are one.
 #[derive(Clone, Copy, Debug)]
 struct Pinned {
     organ: usize,
     nodes: [u32; 3],
-    /// Corners (m), counterclockwise seen from outside.
+    /// Corners (m); those of a triangle counterclockwise seen from outside.
     corners: [DVec3; 3],
+    /// Unit normal, out of the organ.
+    outward: DVec3,
 }
 
 impl Pinned {
@@ -50,54 +54,59 @@ impl Pinned {
     }
 }
 
-/// A box around triangles. Its first child follows it.
+/// A box around features. Its first child follows it.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     low: DVec3,
     high: DVec3,
-    /// The triangles of a leaf; empty otherwise.
+    /// The features of a leaf; empty otherwise.
     leaf: [usize; 2],
     /// The node after its last descendant.
     after: usize,
 }
 
 impl PinnedSurface {
-    /// The pinned triangles of `world` at their present place, which never changes. None if
+    /// The pinned features of `world` at their present place, which never changes. None if
     /// instruments do not touch organs.
     pub fn felt(world: &World, contact: ContactParts) -> Self {
         if !contact.instruments {
             return Self::default();
         }
-        let mut triangles = Vec::new();
+        let mut features = Vec::new();
         for (k, body) in world.model.bodies().iter().enumerate() {
             let pinned = body.pinned();
             if !pinned.contains(&true) {
                 continue;
             }
             if let Some(surface) = body.collision_surface() {
-                triangles.extend(of_surface(world, k, surface));
-                continue;
-            }
-            let (boundary, nodes) = body.rest().boundary();
-            for t in &boundary.triangles {
-                let nodes = t.map(|i| nodes[i as usize]);
-                if nodes.iter().all(|i| pinned[*i as usize]) {
-                    let corners = nodes.map(|i| world.state.position(&world.model, k, i as usize));
-                    triangles.push(Pinned { organ: k, nodes, corners });
-                }
+                let places = world.state.collision_positions(&world.model, k);
+                let vertex = |i: u32| Vertex::of_surface(pinned, surface, i, places[i as usize]);
+                add_features(k, &surface.mesh().triangles, vertex, &mut features);
+            } else {
+                let (boundary, nodes) = body.rest().boundary();
+                let vertex = |i: u32| {
+                    let node = nodes[i as usize];
+                    let place = world.state.position(&world.model, k, node as usize);
+                    Vertex { node, place, is_pinned: pinned[node as usize] }
+                };
+                add_features(k, &boundary.triangles, vertex, &mut features);
             }
         }
+        Self::of(features)
+    }
+
+    fn of(mut features: Vec<Pinned>) -> Self {
         let mut nodes = Vec::new();
-        build(&mut triangles, 0, &mut nodes);
-        Self { triangles, nodes }
+        build(&mut features, 0, &mut nodes);
+        Self { features, nodes }
     }
 
     /// Adds the meetings of `rods`, which belong to `tool` and pass through its `holes`.
     pub(super) fn meet(&self, rods: &[Rod], holes: &[Hole], tool: usize, found: &mut Deepest) {
         for rod in rods {
-            self.for_near(&rod.ends, rod.radius + REACH, |triangle| {
-                if let Some(meeting) = meeting(rod, &triangle.corners).filter(|_| !triangle.lets_through(holes, tool)) {
-                    found.add(rod.part, Meeting { organ: Some(triangle.organ), ..meeting });
+            self.for_near(&rod.ends, rod.radius + REACH, |feature| {
+                if let Some(meeting) = meeting(rod, feature).filter(|_| !feature.lets_through(holes, tool)) {
+                    found.add(rod.part, meeting);
                 }
             });
         }
@@ -108,14 +117,14 @@ impl PinnedSurface {
     pub(super) fn is_crossed(&self, rods: &[Rod], holes: &[Hole], tool: usize) -> bool {
         let mut crossed = false;
         for rod in rods {
-            self.for_near(&rod.ends, 0.0, |triangle| {
-                crossed |= crosses(&rod.ends, &triangle.corners) && !triangle.lets_through(holes, tool);
+            self.for_near(&rod.ends, 0.0, |feature| {
+                crossed |= crosses(&rod.ends, &feature.corners) && !feature.lets_through(holes, tool);
             });
         }
         crossed
     }
 
-    /// Calls `found` for the triangles whose boxes are within `reach` (m) of a segment.
+    /// Calls `found` for the features whose boxes are within `reach` (m) of a segment.
     fn for_near(&self, segment: &[DVec3; 2], reach: f64, mut found: impl FnMut(&Pinned)) {
         let mut at = 0;
         while let Some(node) = self.nodes.get(at) {
@@ -123,49 +132,90 @@ impl PinnedSurface {
                 at = node.after;
                 continue;
             }
-            self.triangles[node.leaf[0]..node.leaf[1]].iter().for_each(&mut found);
+            self.features[node.leaf[0]..node.leaf[1]].iter().for_each(&mut found);
             at += 1;
         }
     }
 }
 
-/// The pinned triangles of the collision surface of `organ`. For holes, a corner is the node with
-/// the greatest weight.
-fn of_surface<'a>(
-    world: &'a World,
-    organ: usize,
-    surface: &'a CollisionSurface,
-) -> impl Iterator<Item = Pinned> + use<'a> {
-    let pinned = world.model.bodies()[organ].pinned();
-    let places = world.state.collision_positions(&world.model, organ);
-    let bearing = |vertex: u32| {
-        let (nodes, weights) = surface.nodes_of(vertex as usize);
-        nodes.into_iter().zip(weights).filter(|(_, weight)| *weight != 0.0)
-    };
-    let is_pinned = move |vertex: &u32| bearing(*vertex).all(|(node, _)| pinned[node as usize]);
-    let node = move |vertex: u32| bearing(vertex).max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(node, _)| node);
-    let still = surface.mesh().triangles.iter().filter(move |t| t.iter().all(is_pinned));
-    still.map(move |t| Pinned { organ, nodes: t.map(node), corners: t.map(|i| places[i as usize]) })
+/// A vertex of a surface.
+#[derive(Clone, Copy)]
+struct Vertex {
+    /// The node that it is, or that bears most of it: for holes.
+    node: u32,
+    place: DVec3,
+    is_pinned: bool,
 }
 
-/// Appends the tree over `triangles`, the first of which is number `first`.
-fn build(triangles: &mut [Pinned], first: usize, nodes: &mut Vec<Node>) {
-    if triangles.is_empty() {
+impl Vertex {
+    /// Vertex `i` of a collision surface, at `place` (m).
+    fn of_surface(pinned: &[bool], surface: &CollisionSurface, i: u32, place: DVec3) -> Self {
+        let (nodes, weights) = surface.nodes_of(i as usize);
+        let bearing = || nodes.into_iter().zip(weights).filter(|(_, weight)| *weight != 0.0);
+        let node = bearing().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(node, _)| node);
+        Self { node, place, is_pinned: bearing().all(|(node, _)| pinned[node as usize]) }
+    }
+}
+
+/// Appends the pinned triangles of a surface of `organ`, and the edges and vertices at the rim of
+/// its pinned part: those of a triangle with a vertex that moves.
+fn add_features(
+    organ: usize,
+    triangles: &[[u32; 3]],
+    vertex: impl Fn(u32) -> Vertex,
+    features: &mut Vec<Pinned>,
+) {
+    // Edges and vertices by their vertices, with the sum of their triangles' normals and whether a
+    // triangle moves.
+    let mut parts: BTreeMap<[u32; 2], (DVec3, bool)> = BTreeMap::new();
+    for t in triangles {
+        let corners = t.map(&vertex);
+        let [a, b, c] = corners.map(|v| v.place);
+        let Some(outward) = (b - a).cross(c - a).try_normalize() else { continue };
+        let moves = corners.iter().any(|v| !v.is_pinned);
+        if !moves {
+            features.push(Pinned { organ, nodes: corners.map(|v| v.node), corners: [a, b, c], outward });
+        }
+        for k in 0..3 {
+            let next = (k + 1) % 3;
+            let mut add = |part: [u32; 2]| {
+                let (sum, rim) = parts.entry(part).or_default();
+                *sum += outward;
+                *rim |= moves;
+            };
+            if corners[k].is_pinned {
+                add([t[k]; 2]);
+                if corners[next].is_pinned {
+                    add([t[k].min(t[next]), t[k].max(t[next])]);
+                }
+            }
+        }
+    }
+    for ([i, k], (sum, _)) in parts.into_iter().filter(|(_, (_, rim))| *rim) {
+        let Some(outward) = sum.try_normalize() else { continue };
+        let corners = [i, k, k].map(&vertex);
+        features.push(Pinned { organ, nodes: corners.map(|v| v.node), corners: corners.map(|v| v.place), outward });
+    }
+}
+
+/// Appends the tree over `features`, the first of which is number `first`.
+fn build(features: &mut [Pinned], first: usize, nodes: &mut Vec<Node>) {
+    if features.is_empty() {
         return;
     }
-    let corners = triangles.iter().flat_map(|t| &t.corners);
+    let corners = features.iter().flat_map(|t| &t.corners);
     let (low, high) =
         corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
-    let (at, count) = (nodes.len(), triangles.len());
+    let (at, count) = (nodes.len(), features.len());
     let leaf = if count <= LEAF { [first, first + count] } else { [first; 2] };
     nodes.push(Node { low, high, leaf, after: 0 });
     if count > LEAF {
         let size = high - low;
         let axis = (0..3).max_by(|a, b| size[*a].total_cmp(&size[*b])).unwrap_or(0);
         let middle = |t: &Pinned| t.corners.iter().map(|p| p[axis]).sum::<f64>();
-        // Stable: triangles of equal middles keep their order.
-        triangles.sort_by(|a, b| middle(a).total_cmp(&middle(b)));
-        let (left, right) = triangles.split_at_mut(count / 2);
+        // Stable: features of equal middles keep their order.
+        features.sort_by(|a, b| middle(a).total_cmp(&middle(b)));
+        let (left, right) = features.split_at_mut(count / 2);
         build(left, first, nodes);
         build(right, first + count / 2, nodes);
     }
@@ -189,10 +239,9 @@ fn near_box([from, to]: &[DVec3; 2], reach: f64, node: &Node) -> bool {
     begin <= end
 }
 
-/// The meeting of a rod with a triangle, if the rod's axis is in front of it.
-fn meeting(rod: &Rod, triangle: &[DVec3; 3]) -> Option<Meeting> {
-    let [a, b, c] = *triangle;
-    let outward = (b - a).cross(c - a).try_normalize()?;
+/// The meeting of a rod with a feature, if the rod's axis is in front of it.
+fn meeting(rod: &Rod, Pinned { organ, corners, outward, .. }: &Pinned) -> Option<Meeting> {
+    let [a, b, c] = *corners;
     let mut best: Option<(f64, DVec3, DVec3)> = None;
     let mut add = |p: DVec3, q: DVec3| {
         let distance = p.distance(q);
@@ -203,22 +252,22 @@ fn meeting(rod: &Rod, triangle: &[DVec3; 3]) -> Option<Meeting> {
     // The nearest places are at an end of the axis or at an edge of the triangle, unless the axis
     // goes through it.
     for p in rod.ends {
-        add(p, closest_on_triangle(triangle, p));
+        add(p, closest_on_triangle(corners, p));
     }
     for edge in [[a, b], [b, c], [c, a]] {
         let [s, t] = nearest_of_segments(rod.ends, edge);
         add(rod.ends[0].lerp(rod.ends[1], s), edge[0].lerp(edge[1], t));
     }
     let (distance, p, q) = best?;
-    if crosses(&rod.ends, triangle) {
+    if crosses(&rod.ends, corners) {
         return None;
     }
     let normal = (p - q).try_normalize()?;
-    if normal.dot(outward) < LEAST_COSINE {
+    if normal.dot(*outward) < LEAST_COSINE {
         return None;
     }
     let gap = distance - rod.radius;
-    Some(Meeting { point: q + 0.5 * gap * normal, normal, gap, room: ROOM * rod.radius, organ: None })
+    Some(Meeting { point: q + 0.5 * gap * normal, normal, gap, room: ROOM * rod.radius, organ: Some(*organ) })
 }
 
 /// Whether a segment goes through a triangle.
@@ -231,4 +280,51 @@ fn crosses(ends: &[DVec3; 2], triangle: &[DVec3; 3]) -> bool {
     }
     let through = ends[0].lerp(ends[1], heights[0] / (heights[0] - heights[1]));
     closest_on_triangle(triangle, through).distance(through) < 1e-12
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trocar_testing::blocks::block;
+
+    /// The surface of a cube of 10 mm around 0 in which only vertices at `pinned` cannot move.
+    fn cube_pinned(pinned: impl Fn(DVec3) -> bool) -> PinnedSurface {
+        let mesh = block([1; 3], 0.01).boundary().0;
+        let vertex = |node: u32| {
+            let place = mesh.vertices[node as usize] - 5e-3;
+            Vertex { node, place, is_pinned: pinned(place) }
+        };
+        let mut features = Vec::new();
+        add_features(0, &mesh.triangles, vertex, &mut features);
+        PinnedSurface::of(features)
+    }
+
+    /// The gap at which a ball of 1 mm at `place` (mm) meets the surface (mm), if it does.
+    fn gap(surface: &PinnedSurface, place: [f64; 3]) -> Option<f64> {
+        let rod = Rod { ends: [1e-3 * DVec3::from(place); 2], radius: 1e-3, part: 0 };
+        let mut found = Deepest::default();
+        surface.meet(&[rod], &[], 0, &mut found);
+        found.into_iter().next().map(|meeting| 1e3 * meeting.gap)
+    }
+
+    #[test]
+    fn vertices_and_edges_at_the_rim_are_solids() {
+        let near = |gap: Option<f64>, to: f64| gap.is_some_and(|gap| (gap - to).abs() < 1e-9);
+        let corner = cube_pinned(|p| p.min_element() > 0.0);
+        assert_eq!(corner.features.len(), 1);
+        assert!(near(gap(&corner, [5.5, 5.0, 5.0]), -0.5));
+        assert_eq!(gap(&corner, [4.5, 4.5, 4.5]), None, "inside");
+        assert_eq!(gap(&corner, [5.5, 0.0, 5.0]), None, "an edge that moves is tissue's");
+        let edge = cube_pinned(|p| p.x > 0.0 && p.y > 0.0);
+        assert_eq!(edge.features.len(), 3, "an edge and its two vertices");
+        assert!(near(gap(&edge, [5.3, 5.4, 0.0]), -0.5));
+        // A face of two triangles, its outer edges and its corners. No triangle at the diagonal
+        // moves.
+        let face = cube_pinned(|p| p.z > 0.0);
+        assert_eq!(face.features.len(), 2 + 4 + 4);
+        assert!(near(gap(&face, [1.0, 2.0, 5.4]), -0.6));
+        assert!(near(gap(&face, [5.4, 1.0, 5.3]), -0.5), "the rim pushes what its face does not");
+        assert!(cube_pinned(|_| false).features.is_empty());
+        assert_eq!(cube_pinned(|_| true).features.len(), 12, "no rim");
+    }
 }
