@@ -14,8 +14,8 @@ pub(super) struct Crossing {
     pub nodes: [u32; 4],
 }
 
-/// The parts of `segments` inside an organ, by element. Elements whose nodes are all pinned do not
-/// count, nor does what is outside of the organ's collision surface.
+/// The parts of `segments` inside an organ, by element. What is outside of the organ's collision
+/// surface does not count.
 pub(super) fn crossings(world: &World, organ: usize, segments: &[[DVec3; 2]]) -> Vec<Crossing> {
     let ends = segments.iter().flatten();
     let (low, high) = ends.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
@@ -23,12 +23,11 @@ pub(super) fn crossings(world: &World, organ: usize, segments: &[[DVec3; 2]]) ->
     let places = world.state.positions(&world.model, organ);
     let side = |p: &DVec3| p.cmplt(low).bitmask() | p.cmpgt(high).bitmask() << 3;
     let sides: Vec<u32> = places.iter().map(side).collect();
-    let pinned = body.pinned();
     let mut found = Vec::new();
     for nodes in body.tets() {
         let t = nodes.map(|i| i as usize);
         // All corners are beyond one side of the box round the segments.
-        if t.iter().fold(u32::MAX, |all, i| all & sides[*i]) != 0 || t.iter().all(|i| pinned[*i]) {
+        if t.iter().fold(u32::MAX, |all, i| all & sides[*i]) != 0 {
             continue;
         }
         let corners = t.map(|i| places[i]);

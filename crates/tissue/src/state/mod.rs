@@ -80,16 +80,19 @@ impl State {
     /// World positions of the vertices of a body's collision surface (m); none if that is the
     /// boundary of its elements.
     pub fn collision_positions(&self, model: &Model, body: usize) -> Vec<DVec3> {
+        let vertices = model.bodies[body].collision_surface().map_or(0, |surface| surface.mesh.vertices.len());
+        (0..vertices).map(|vertex| self.collision_position(model, body, vertex)).collect()
+    }
+
+    /// World position of a vertex of a body's collision surface (m); zero if it has none.
+    pub fn collision_position(&self, model: &Model, body: usize, vertex: usize) -> DVec3 {
         let (b, state) = (&model.bodies[body], &self.bodies[body]);
-        let Some(surface) = b.collision_surface() else { return Vec::new() };
-        let place = |k: usize| {
-            let point = b.lattice.as_ref().and_then(|lattice| lattice.points[b.len() + k]);
-            match (point, &state.lattice) {
-                (Some(point), Some(lattice)) => b.origin + point.interpolate(&lattice.positions),
-                _ => surface.place(k, |node| self.position(model, body, node)),
-            }
-        };
-        (0..surface.mesh.vertices.len()).map(place).collect()
+        let Some(surface) = b.collision_surface() else { return DVec3::ZERO };
+        let point = b.lattice.as_ref().and_then(|lattice| lattice.points[b.len() + vertex]);
+        match (point, &state.lattice) {
+            (Some(point), Some(lattice)) => b.origin + point.interpolate(&lattice.positions),
+            _ => surface.place(vertex, |node| self.position(model, body, node)),
+        }
     }
 
     /// World positions of a body's nodes (m).

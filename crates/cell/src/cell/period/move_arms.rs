@@ -15,6 +15,7 @@ impl Cell {
         let clock = Instant::now();
         let dt = FRAME / f64::from(self.physics_steps);
         self.solids.holes.clone_from(&self.world.state.holes);
+        self.solids.pinned.follow(&self.world);
         for step in 0..self.physics_steps {
             if frame * self.physics_steps + step == self.delay.step {
                 self.command(log)?;

@@ -1,6 +1,5 @@
 //! Where an instrument touches a solid, or may within a physics step.
 
-use super::rod::PARTS;
 use glam::DVec3;
 
 /// Gap below which a touch is possible within a step (m): two tips at 0.1 m/s come nearer by 0.42
@@ -23,21 +22,26 @@ pub(in crate::cell) struct Meeting {
     pub organ: Option<usize>,
 }
 
-/// The deepest meeting of each rigid part of an instrument.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Deepest([Option<Meeting>; PARTS]);
+/// The deepest meeting of each rigid part of an instrument with each organ, and with the bed. A
+/// part between two organs is pushed by both.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Deepest(Vec<(usize, Meeting)>);
 
 impl Deepest {
     /// Adds one of `part`, if it is near and deeper than those before.
     pub fn add(&mut self, part: usize, meeting: Meeting) {
-        let now = &mut self.0[part];
-        if meeting.gap < now.map_or(REACH, |m| m.gap) {
-            *now = Some(meeting);
+        if meeting.gap >= REACH {
+            return;
+        }
+        match self.0.iter_mut().find(|(other, known)| (*other, known.organ) == (part, meeting.organ)) {
+            Some((_, known)) if known.gap <= meeting.gap => {}
+            Some((_, known)) => *known = meeting,
+            None => self.0.push((part, meeting)),
         }
     }
 
-    /// They, by part.
+    /// They, in the order in which they were found first.
     pub fn into_iter(self) -> impl Iterator<Item = Meeting> {
-        self.0.into_iter().flatten()
+        self.0.into_iter().map(|(_, meeting)| meeting)
     }
 }

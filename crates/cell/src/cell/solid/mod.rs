@@ -7,8 +7,8 @@
 //! An ideal arm stops where the solids push it with the scene's force limit ([`step`]).
 //!
 //! Tissue that moves is not a solid: its own step finds its contacts. That step knows no contact of
-//! vertices that are pinned, so triangles of three pinned vertices are solids ([`pinned`]), and all
-//! other triangles are not.
+//! vertices that are pinned, so triangles of three pinned vertices are solids, and so are pinned
+//! vertices and edges at their rim ([`pinned`]). All other triangles are not.
 
 mod bed;
 mod jaws;

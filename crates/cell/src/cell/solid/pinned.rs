@@ -5,7 +5,8 @@
 //! would let an instrument pass. Here they are solids for the instrument's axis on their outer
 //! side, with no margin: an instrument that lies beside them is not touched. Triangles with a
 //! vertex that moves belong to the tissue's contact, whose stiffness falls to 0 at a pinned vertex
-//! and at an edge between two. At the rim of the pinned part these are solids of their own.
+//! and at an edge between two. At the rim of the pinned part these are solids of their own, and
+//! their outer side is where the tissue around them leaves room now.
 
 use super::meeting::{Deepest, Meeting, REACH};
 use super::rod::Rod;
@@ -14,13 +15,14 @@ use crate::cell::ContactParts;
 use glam::DVec3;
 use std::collections::BTreeMap;
 use trocar_geometry::{closest_on_triangle, nearest_of_segments};
-use trocar_tissue::{CollisionSurface, Hole};
+use trocar_tissue::Hole;
 
-/// Least cosine of the angle between a feature's normal and the direction in which it pushes.
+/// Least cosine of the angle between a triangle's normal and the direction in which it pushes. An
+/// edge or vertex at the rim pushes to its whole outer side.
 const LEAST_COSINE: f64 = 0.5;
 
 /// Share of a rod's radius by which it may come into tissue. An axis that came near the surface
-/// would get past the edge between two triangles, because a part is pushed by one triangle only.
+/// would get past the edge between two triangles, because an organ pushes a part with one triangle only.
 const ROOM: f64 = 0.5;
 
 /// Most features of a leaf.
@@ -32,6 +34,8 @@ pub(in crate::cell) struct PinnedSurface {
     /// In the tree's order.
     features: Vec<Pinned>,
     nodes: Vec<Node>,
+    /// The triangles around each feature at the rim.
+    rims: Vec<Vec<[u32; 3]>>,
 }
 
 /// A triangle of an organ whose vertices are pinned; or an edge or a vertex at the rim, as a
@@ -44,6 +48,8 @@ struct Pinned {
     corners: [DVec3; 3],
     /// Unit normal, out of the organ.
     outward: DVec3,
+    /// Number of its rim, of an edge or vertex.
+    rim: Option<usize>,
 }
 
 impl Pinned {
@@ -72,33 +78,73 @@ impl PinnedSurface {
         if !contact.instruments {
             return Self::default();
         }
-        let mut features = Vec::new();
+        let mut surface = Self::default();
         for (k, body) in world.model.bodies().iter().enumerate() {
-            let pinned = body.pinned();
-            if !pinned.contains(&true) {
+            if !body.pinned().contains(&true) {
                 continue;
             }
-            if let Some(surface) = body.collision_surface() {
-                let places = world.state.collision_positions(&world.model, k);
-                let vertex = |i: u32| Vertex::of_surface(pinned, surface, i, places[i as usize]);
-                add_features(k, &surface.mesh().triangles, vertex, &mut features);
-            } else {
-                let (boundary, nodes) = body.rest().boundary();
-                let vertex = |i: u32| {
-                    let node = nodes[i as usize];
-                    let place = world.state.position(&world.model, k, node as usize);
-                    Vertex { node, place, is_pinned: pinned[node as usize] }
-                };
-                add_features(k, &boundary.triangles, vertex, &mut features);
+            let vertex = |i: u32| Vertex::of(world, k, i);
+            match body.collision_surface() {
+                Some(collision) => surface.add(k, &collision.mesh().triangles, vertex),
+                None => {
+                    let (boundary, nodes) = body.rest().boundary();
+                    let triangles: Vec<[u32; 3]> =
+                        boundary.triangles.iter().map(|t| t.map(|i| nodes[i as usize])).collect();
+                    surface.add(k, &triangles, vertex);
+                }
             }
         }
-        Self::of(features)
+        build(&mut surface.features, 0, &mut surface.nodes);
+        surface
     }
 
-    fn of(mut features: Vec<Pinned>) -> Self {
-        let mut nodes = Vec::new();
-        build(&mut features, 0, &mut nodes);
-        Self { features, nodes }
+    /// Appends the pinned triangles of a surface of `organ`, and the edges and vertices at the rim
+    /// of its pinned part: those of a triangle with a vertex that moves.
+    fn add(&mut self, organ: usize, triangles: &[[u32; 3]], vertex: impl Fn(u32) -> Vertex) {
+        // Edges and vertices by their vertices, with their triangles and whether one moves.
+        let mut parts: BTreeMap<[u32; 2], (Vec<[u32; 3]>, bool)> = BTreeMap::new();
+        let mut add = |corners: [Vertex; 3], outward: Option<DVec3>, rim: Option<usize>| {
+            if let Some(outward) = outward {
+                let (nodes, corners) = (corners.map(|v| v.node), corners.map(|v| v.place));
+                self.features.push(Pinned { organ, nodes, corners, outward, rim });
+            }
+        };
+        for t in triangles {
+            let corners = t.map(&vertex);
+            let moves = corners.iter().any(|v| !v.is_pinned);
+            if !moves {
+                add(corners, mean_normal(&[*t], |i| vertex(i).place), None);
+            }
+            let mut part = |i: u32, k: u32| {
+                let (around, rim) = parts.entry([i.min(k), i.max(k)]).or_default();
+                around.push(*t);
+                *rim |= moves;
+            };
+            for k in 0..3 {
+                let next = (k + 1) % 3;
+                if corners[k].is_pinned {
+                    part(t[k], t[k]);
+                    if corners[next].is_pinned {
+                        part(t[k], t[next]);
+                    }
+                }
+            }
+        }
+        for ([i, k], (around, _)) in parts.into_iter().filter(|(_, (_, rim))| *rim) {
+            add([i, k, k].map(&vertex), mean_normal(&around, |i| vertex(i).place), Some(self.rims.len()));
+            self.rims.push(around);
+        }
+    }
+
+    /// Turns the normals at the rim to where the tissue around them is now.
+    pub fn follow(&mut self, world: &World) {
+        for feature in &mut self.features {
+            if let Some(rim) = feature.rim
+                && let Some(outward) = mean_normal(&self.rims[rim], |i| Vertex::of(world, feature.organ, i).place)
+            {
+                feature.outward = outward;
+            }
+        }
     }
 
     /// Adds the meetings of `rods`, which belong to `tool` and pass through its `holes`.
@@ -148,54 +194,29 @@ struct Vertex {
 }
 
 impl Vertex {
-    /// Vertex `i` of a collision surface, at `place` (m).
-    fn of_surface(pinned: &[bool], surface: &CollisionSurface, i: u32, place: DVec3) -> Self {
+    /// Vertex `i` of the collision surface of `organ`, or its node `i` without one.
+    fn of(world: &World, organ: usize, i: u32) -> Self {
+        let body = &world.model.bodies()[organ];
+        let pinned = |node: u32| body.pinned()[node as usize];
+        let Some(surface) = body.collision_surface() else {
+            let place = world.state.position(&world.model, organ, i as usize);
+            return Self { node: i, place, is_pinned: pinned(i) };
+        };
         let (nodes, weights) = surface.nodes_of(i as usize);
         let bearing = || nodes.into_iter().zip(weights).filter(|(_, weight)| *weight != 0.0);
         let node = bearing().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(node, _)| node);
-        Self { node, place, is_pinned: bearing().all(|(node, _)| pinned[node as usize]) }
+        let place = world.state.collision_position(&world.model, organ, i as usize);
+        Self { node, place, is_pinned: bearing().all(|(node, _)| pinned(node)) }
     }
 }
 
-/// Appends the pinned triangles of a surface of `organ`, and the edges and vertices at the rim of
-/// its pinned part: those of a triangle with a vertex that moves.
-fn add_features(
-    organ: usize,
-    triangles: &[[u32; 3]],
-    vertex: impl Fn(u32) -> Vertex,
-    features: &mut Vec<Pinned>,
-) {
-    // Edges and vertices by their vertices, with the sum of their triangles' normals and whether a
-    // triangle moves.
-    let mut parts: BTreeMap<[u32; 2], (DVec3, bool)> = BTreeMap::new();
-    for t in triangles {
-        let corners = t.map(&vertex);
-        let [a, b, c] = corners.map(|v| v.place);
-        let Some(outward) = (b - a).cross(c - a).try_normalize() else { continue };
-        let moves = corners.iter().any(|v| !v.is_pinned);
-        if !moves {
-            features.push(Pinned { organ, nodes: corners.map(|v| v.node), corners: [a, b, c], outward });
-        }
-        for k in 0..3 {
-            let next = (k + 1) % 3;
-            let mut add = |part: [u32; 2]| {
-                let (sum, rim) = parts.entry(part).or_default();
-                *sum += outward;
-                *rim |= moves;
-            };
-            if corners[k].is_pinned {
-                add([t[k]; 2]);
-                if corners[next].is_pinned {
-                    add([t[k].min(t[next]), t[k].max(t[next])]);
-                }
-            }
-        }
-    }
-    for ([i, k], (sum, _)) in parts.into_iter().filter(|(_, (_, rim))| *rim) {
-        let Some(outward) = sum.try_normalize() else { continue };
-        let corners = [i, k, k].map(&vertex);
-        features.push(Pinned { organ, nodes: corners.map(|v| v.node), corners: corners.map(|v| v.place), outward });
-    }
+/// The mean of the unit normals of triangles, made a unit vector, if there is one.
+fn mean_normal(triangles: &[[u32; 3]], place: impl Fn(u32) -> DVec3) -> Option<DVec3> {
+    let normal = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(&place);
+        (b - a).cross(c - a).normalize_or_zero()
+    };
+    triangles.iter().map(normal).sum::<DVec3>().try_normalize()
 }
 
 /// Appends the tree over `features`, the first of which is number `first`.
@@ -240,7 +261,7 @@ fn near_box([from, to]: &[DVec3; 2], reach: f64, node: &Node) -> bool {
 }
 
 /// The meeting of a rod with a feature, if the rod's axis is in front of it.
-fn meeting(rod: &Rod, Pinned { organ, corners, outward, .. }: &Pinned) -> Option<Meeting> {
+fn meeting(rod: &Rod, Pinned { organ, corners, outward, rim, .. }: &Pinned) -> Option<Meeting> {
     let [a, b, c] = *corners;
     let mut best: Option<(f64, DVec3, DVec3)> = None;
     let mut add = |p: DVec3, q: DVec3| {
@@ -263,7 +284,7 @@ fn meeting(rod: &Rod, Pinned { organ, corners, outward, .. }: &Pinned) -> Option
         return None;
     }
     let normal = (p - q).try_normalize()?;
-    if normal.dot(*outward) < LEAST_COSINE {
+    if normal.dot(*outward) < if rim.is_some() { 0.0 } else { LEAST_COSINE } {
         return None;
     }
     let gap = distance - rod.radius;
@@ -294,9 +315,10 @@ mod tests {
             let place = mesh.vertices[node as usize] - 5e-3;
             Vertex { node, place, is_pinned: pinned(place) }
         };
-        let mut features = Vec::new();
-        add_features(0, &mesh.triangles, vertex, &mut features);
-        PinnedSurface::of(features)
+        let mut surface = PinnedSurface::default();
+        surface.add(0, &mesh.triangles, vertex);
+        build(&mut surface.features, 0, &mut surface.nodes);
+        surface
     }
 
     /// The gap at which a ball of 1 mm at `place` (mm) meets the surface (mm), if it does.
