@@ -9,6 +9,7 @@ use common::{close, shift};
 use glam::DVec3;
 use trocar_cell::{Cell, CellEvent, CellReport};
 use trocar_scene::{Arm, Scene, Side};
+use trocar_specimen::Pins;
 use trocar_testing::tube::{ONE_END, meshed, scene};
 
 /// Height of the middle of the tube, which lies on its bed (m).
@@ -23,13 +24,19 @@ const FAST: usize = 10;
 /// The tube below one free ideal arm, with its blades' tips 10 mm above it. Nothing but tissue
 /// stops it.
 fn above(puncture_force_n: f64) -> Cell {
+    above_tube(puncture_force_n, 10.0, ONE_END)
+}
+
+/// The same with the force with which solids stop the arm (N), and with pins.
+fn above_tube(puncture_force_n: f64, force_limit_n: f64, pins: Pins) -> Cell {
     let mut scene: Scene = scene();
     scene.task.organ = "tube".to_owned();
     scene.arms = vec![Arm::free(Side::Left, "grasper", [0.0, 0.46, TUBE_HEIGHT + BLADE + 0.015])];
     scene.instruments.truncate(1);
     scene.safety.rules.force_guard = false;
     scene.safety.puncture_force_n = puncture_force_n;
-    let mut cell = Cell::new(&scene, &meshed(ONE_END, 2.2e-3), 1).unwrap();
+    scene.safety.force_limit_n = force_limit_n;
+    let mut cell = Cell::new(&scene, &meshed(pins, 2.2e-3), 1).unwrap();
     close(&mut cell, 30);
     cell
 }
@@ -94,4 +101,21 @@ fn below_the_threshold_nothing_is_punctured() {
     assert!(force(&down) > 5.0, "it presses as hard as in the other test: {} N", force(&down));
     assert!(punctures(&down).is_empty() && cell.punctured_by(0).is_empty());
     assert!(pierced(&down) > 0 && cell.pierces("left").unwrap(), "it is counted instead");
+}
+
+/// No contact of the tissue's step tells that an instrument is in tissue of which no node moves.
+#[test]
+fn an_instrument_in_tissue_that_cannot_move_is_noticed_until_it_is_out() {
+    for (threshold, punctured) in [(10.0, true), (1000.0, false)] {
+        let mut cell = above_tube(threshold, 1000.0, Pins::Band { share: 1.0 });
+        let down = shift(&mut cell, "left", -0.018 * DVec3::Z, 4);
+        let found = (punctures(&down).len(), pierced(&down));
+        println!("threshold {threshold} N: {found:?}");
+        assert_eq!(found, if punctured { (1, 0) } else { (0, 1) });
+        assert_eq!(cell.punctured_by(0).is_empty(), !punctured);
+        assert_eq!((cell.axes_inside()[0], cell.pierces("left").unwrap()), (!punctured, !punctured));
+        let out = shift(&mut cell, "left", 0.03 * DVec3::Z, 30);
+        assert!(punctures(&out).is_empty() && pierced(&out) == 0);
+        assert!(cell.punctured_by(0).is_empty() && !cell.pierces("left").unwrap() && !cell.axes_inside()[0]);
+    }
 }

@@ -52,6 +52,11 @@ impl Pressed {
         self.by_organ.get(organ).map_or(0.0, |press| press.last.iter().copied().fold(0.0, f64::max))
     }
 
+    /// Whether an organ pressed in the last frames.
+    pub fn is_any(&self) -> bool {
+        self.by_organ.iter().any(|press| press.last.iter().any(|force| *force > 0.0))
+    }
+
     fn of(&mut self, organ: usize) -> &mut Press {
         if self.by_organ.len() <= organ {
             self.by_organ.resize(organ + 1, Press::default());

@@ -11,7 +11,8 @@ use crate::cell::report::{CellEvent, PeriodLog};
 
 pub(super) fn warn(world: &World, arms: &mut [ArmUnit], log: &mut PeriodLog) {
     for arm in arms {
-        let near = arm.state.pierces || arm.meets_tissue();
+        // Tissue that cannot move presses without a contact of the tissue's step.
+        let near = arm.state.pierces || arm.meets_tissue() || arm.state.pressed.is_any();
         let organ = if near { arm.pierces(world).first().map(|(organ, _)| *organ) } else { None };
         if let Some(organ) = organ.filter(|_| !arm.state.pierces) {
             log.rules.pierced += 1;

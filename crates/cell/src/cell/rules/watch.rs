@@ -13,12 +13,12 @@ impl Cell {
     /// whose smallest element has the share `least` of its rest volume. Returns the strain of the
     /// tissue at each arm, or none of it where the scene has no strain guard.
     pub(in crate::cell) fn watch_tissue(&mut self, least: f64, log: &mut PeriodLog) -> Vec<TissueAtArm> {
+        pierce::warn(&self.world, &mut self.arms, log);
         let none = vec![TissueAtArm::default(); self.arms.len()];
         let strained = self.watches.iter().any(|watch| *watch != OrganWatch::default());
         if least > SQUEEZED && !strained && !self.arms.iter().any(ArmUnit::meets_tissue) {
             return none;
         }
-        pierce::warn(&self.world, &mut self.arms, log);
         let strains = self.edges.strains(&self.world, least);
         self.watches.resize(strains.len(), OrganWatch::default());
         for (organ, strain) in strains.iter().enumerate() {

@@ -28,7 +28,7 @@ pub(in crate::cell) struct Meeting {
 pub(super) struct Deepest(Vec<(usize, Meeting)>);
 
 impl Deepest {
-    /// Adds one of `part`, if it is near and deeper than those before.
+    /// Adds one of `part`, if it is near and deeper than those before with the same organ.
     pub fn add(&mut self, part: usize, meeting: Meeting) {
         if meeting.gap >= REACH {
             return;
@@ -40,8 +40,35 @@ impl Deepest {
         }
     }
 
-    /// They, in the order in which they were found first.
+    /// The meetings. Parts and organs are in the order in which they met first.
     pub fn into_iter(self) -> impl Iterator<Item = Meeting> {
         self.0.into_iter().map(|(_, meeting)| meeting)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_meets_each_organ_at_its_deepest_place() {
+        let meeting = |organ, gap| Meeting { point: DVec3::ZERO, normal: DVec3::X, gap, room: 1e-3, organ };
+        let mut found = Deepest::default();
+        for (part, organ, gap) in [
+            (1, Some(0), -1e-4),
+            (1, Some(3), -2e-4),
+            (1, Some(0), -3e-4),
+            (1, Some(3), 1e-4),
+            (2, Some(0), 4e-4),
+            (2, None, 1e-4),
+            (0, Some(3), 1.0),
+        ] {
+            found.add(part, meeting(organ, gap));
+        }
+        let all: Vec<Meeting> = found.into_iter().collect();
+        assert_eq!(
+            all,
+            [(Some(0), -3e-4), (Some(3), -2e-4), (Some(0), 4e-4), (None, 1e-4)].map(|(o, g)| meeting(o, g))
+        );
     }
 }

@@ -7,8 +7,8 @@
 //! An ideal arm stops where the solids push it with the scene's force limit ([`step`]).
 //!
 //! Tissue that moves is not a solid: its own step finds its contacts. That step knows no contact of
-//! vertices that are pinned, so triangles of three pinned vertices are solids, and so are pinned
-//! vertices and edges at their rim ([`pinned`]). All other triangles are not.
+//! vertices that are pinned, so triangles of three pinned vertices are solids ([`pinned`]), and so
+//! are pinned vertices and edges of other triangles ([`rim`]).
 
 mod bed;
 mod jaws;
@@ -16,9 +16,11 @@ mod load;
 mod meeting;
 mod pair;
 mod pinned;
+mod rim;
 mod rod;
 mod spring;
 mod step;
+mod surface_vertex;
 
 use trocar_tissue::Hole;
 
@@ -32,7 +34,7 @@ pub(super) use rod::{Rod, clearance};
 pub(super) struct Solids {
     /// Height of the bed's plane (m), if there is a bed.
     pub bed: Option<f64>,
-    /// Triangles of organs that cannot move. They only change when organs are cut.
+    /// Tissue that cannot move. It only changes when organs are cut.
     pub pinned: PinnedSurface,
     /// The holes of the tissue's state in this frame, which let instruments through.
     pub holes: Vec<Hole>,

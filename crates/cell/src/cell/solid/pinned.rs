@@ -1,15 +1,16 @@
-//! Tissue that cannot move: the triangles, edges and vertices of organs whose vertices are all
-//! pinned. Of a collision surface these are vertices whose nodes are all pinned.
+//! Tissue that cannot move: the triangles of organs whose three vertices are pinned. Of a collision
+//! surface these are vertices whose nodes are all pinned.
 //!
 //! The tissue's own step finds contacts of points that move. It has none for pinned ones, so they
-//! would let an instrument pass. Here they are solids for the instrument's axis on their outer
-//! side, with no margin: an instrument that lies beside them is not touched. Triangles with a
-//! vertex that moves belong to the tissue's contact, whose stiffness falls to 0 at a pinned vertex
-//! and at an edge between two. At the rim of the pinned part these are solids of their own, and
-//! their outer side is where the tissue around them leaves room now.
+//! would let an instrument pass. Here such a triangle is a solid for the instrument's axis on its
+//! outer side, with no margin: an instrument that lies beside it is not touched. Triangles with a
+//! vertex that moves belong to the tissue's contact. Its stiffness falls to 0 at a pinned vertex and
+//! at an edge between two, so these are solids, too, where such a triangle begins ([`super::rim`]).
 
 use super::meeting::{Deepest, Meeting, REACH};
+use super::rim::{Rim, RimPlaces};
 use super::rod::Rod;
+use super::surface_vertex::SurfaceVertex;
 use crate::World;
 use crate::cell::ContactParts;
 use glam::DVec3;
@@ -17,12 +18,11 @@ use std::collections::BTreeMap;
 use trocar_geometry::{closest_on_triangle, nearest_of_segments};
 use trocar_tissue::Hole;
 
-/// Least cosine of the angle between a triangle's normal and the direction in which it pushes. An
-/// edge or vertex at the rim pushes to its whole outer side.
+/// Least cosine of the angle between a triangle's normal and the direction in which it pushes.
 const LEAST_COSINE: f64 = 0.5;
 
 /// Share of a rod's radius by which it may come into tissue. An axis that came near the surface
-/// would get past the edge between two triangles, because an organ pushes a part with one triangle only.
+/// would get past the edge between two triangles, because an organ pushes a part at one place only.
 const ROOM: f64 = 0.5;
 
 /// Most features of a leaf.
@@ -34,22 +34,28 @@ pub(in crate::cell) struct PinnedSurface {
     /// In the tree's order.
     features: Vec<Pinned>,
     nodes: Vec<Node>,
-    /// The triangles around each feature at the rim.
-    rims: Vec<Vec<[u32; 3]>>,
+    rims: Vec<Rim>,
+    places: RimPlaces,
 }
 
-/// A triangle of an organ whose vertices are pinned; or an edge or a vertex at the rim, as a
-/// triangle whose last corners are one.
+/// A pinned triangle of an organ, or an edge or a vertex at a rim.
 #[derive(Clone, Copy, Debug)]
 struct Pinned {
     organ: usize,
     nodes: [u32; 3],
-    /// Corners (m); those of a triangle counterclockwise seen from outside.
+    /// Corners (m), counterclockwise seen from outside; of an edge or a vertex the last ones are
+    /// the same.
     corners: [DVec3; 3],
-    /// Unit normal, out of the organ.
-    outward: DVec3,
-    /// Number of its rim, of an edge or vertex.
-    rim: Option<usize>,
+    side: Side,
+}
+
+/// Where the outside of a pinned feature is.
+#[derive(Clone, Copy, Debug)]
+enum Side {
+    /// The unit normal of a triangle.
+    Face(DVec3),
+    /// Number of a rim.
+    Rim(usize),
 }
 
 impl Pinned {
@@ -72,25 +78,24 @@ struct Node {
 }
 
 impl PinnedSurface {
-    /// The pinned features of `world` at their present place, which never changes. None if
-    /// instruments do not touch organs.
+    /// The pinned features of `world`, which stay where they are. None if instruments do not touch
+    /// organs.
     pub fn felt(world: &World, contact: ContactParts) -> Self {
         if !contact.instruments {
             return Self::default();
         }
         let mut surface = Self::default();
-        for (k, body) in world.model.bodies().iter().enumerate() {
+        for (organ, body) in world.model.bodies().iter().enumerate() {
             if !body.pinned().contains(&true) {
                 continue;
             }
-            let vertex = |i: u32| Vertex::of(world, k, i);
+            let vertex = |i: u32| SurfaceVertex::of(world, organ, i);
             match body.collision_surface() {
-                Some(collision) => surface.add(k, &collision.mesh().triangles, vertex),
+                Some(collision) => surface.add(organ, &collision.mesh().triangles, vertex),
                 None => {
                     let (boundary, nodes) = body.rest().boundary();
-                    let triangles: Vec<[u32; 3]> =
-                        boundary.triangles.iter().map(|t| t.map(|i| nodes[i as usize])).collect();
-                    surface.add(k, &triangles, vertex);
+                    let triangles = boundary.triangles.iter().map(|t| t.map(|i| nodes[i as usize]));
+                    surface.add(organ, &triangles.collect::<Vec<_>>(), vertex);
                 }
             }
         }
@@ -98,60 +103,47 @@ impl PinnedSurface {
         surface
     }
 
-    /// Appends the pinned triangles of a surface of `organ`, and the edges and vertices at the rim
-    /// of its pinned part: those of a triangle with a vertex that moves.
-    fn add(&mut self, organ: usize, triangles: &[[u32; 3]], vertex: impl Fn(u32) -> Vertex) {
-        // Edges and vertices by their vertices, with their triangles and whether one moves.
-        let mut parts: BTreeMap<[u32; 2], (Vec<[u32; 3]>, bool)> = BTreeMap::new();
-        let mut add = |corners: [Vertex; 3], outward: Option<DVec3>, rim: Option<usize>| {
-            if let Some(outward) = outward {
-                let (nodes, corners) = (corners.map(|v| v.node), corners.map(|v| v.place));
-                self.features.push(Pinned { organ, nodes, corners, outward, rim });
-            }
+    /// Appends the pinned features of a surface of `organ`.
+    fn add(&mut self, organ: usize, triangles: &[[u32; 3]], vertex: impl Fn(u32) -> SurfaceVertex) {
+        // The triangles around each pinned edge and vertex, by its ends, and whether one moves.
+        let mut around: BTreeMap<[u32; 2], (Vec<[u32; 3]>, bool)> = BTreeMap::new();
+        let mut push = |corners: [SurfaceVertex; 3], side: Side| {
+            let (nodes, corners) = (corners.map(|v| v.node), corners.map(|v| v.place));
+            self.features.push(Pinned { organ, nodes, corners, side });
         };
         for t in triangles {
             let corners = t.map(&vertex);
+            let [a, b, c] = corners.map(|v| v.place);
             let moves = corners.iter().any(|v| !v.is_pinned);
-            if !moves {
-                add(corners, mean_normal(&[*t], |i| vertex(i).place), None);
+            if let Some(outward) = (b - a).cross(c - a).try_normalize().filter(|_| !moves) {
+                push(corners, Side::Face(outward));
             }
-            let mut part = |i: u32, k: u32| {
-                let (around, rim) = parts.entry([i.min(k), i.max(k)]).or_default();
-                around.push(*t);
-                *rim |= moves;
-            };
-            for k in 0..3 {
-                let next = (k + 1) % 3;
-                if corners[k].is_pinned {
-                    part(t[k], t[k]);
-                    if corners[next].is_pinned {
-                        part(t[k], t[next]);
-                    }
+            let mut note = |i: usize, k: usize| {
+                if corners[i].is_pinned && corners[k].is_pinned {
+                    let (triangles, rim) = around.entry([t[i].min(t[k]), t[i].max(t[k])]).or_default();
+                    triangles.push(*t);
+                    *rim |= moves;
                 }
-            }
+            };
+            (0..3).for_each(|i| note(i, i));
+            (0..3).for_each(|i| note(i, (i + 1) % 3));
         }
-        for ([i, k], (around, _)) in parts.into_iter().filter(|(_, (_, rim))| *rim) {
-            add([i, k, k].map(&vertex), mean_normal(&around, |i| vertex(i).place), Some(self.rims.len()));
-            self.rims.push(around);
+        for (ends, (triangles, _)) in around.into_iter().filter(|(_, (_, rim))| *rim) {
+            push([ends[0], ends[1], ends[1]].map(&vertex), Side::Rim(self.rims.len()));
+            self.rims.push(Rim::new(organ, ends, &triangles, |i| vertex(i).place, &mut self.places));
         }
     }
 
-    /// Turns the normals at the rim to where the tissue around them is now.
+    /// Reads where the tissue around the rims is now.
     pub fn follow(&mut self, world: &World) {
-        for feature in &mut self.features {
-            if let Some(rim) = feature.rim
-                && let Some(outward) = mean_normal(&self.rims[rim], |i| Vertex::of(world, feature.organ, i).place)
-            {
-                feature.outward = outward;
-            }
-        }
+        self.places.follow(world);
     }
 
     /// Adds the meetings of `rods`, which belong to `tool` and pass through its `holes`.
     pub(super) fn meet(&self, rods: &[Rod], holes: &[Hole], tool: usize, found: &mut Deepest) {
         for rod in rods {
             self.for_near(&rod.ends, rod.radius + REACH, |feature| {
-                if let Some(meeting) = meeting(rod, feature).filter(|_| !feature.lets_through(holes, tool)) {
+                if let Some(meeting) = self.meeting(rod, feature).filter(|_| !feature.lets_through(holes, tool)) {
                     found.add(rod.part, meeting);
                 }
             });
@@ -164,10 +156,35 @@ impl PinnedSurface {
         let mut crossed = false;
         for rod in rods {
             self.for_near(&rod.ends, 0.0, |feature| {
-                crossed |= crosses(&rod.ends, &feature.corners) && !feature.lets_through(holes, tool);
+                let is_face = matches!(feature.side, Side::Face(_));
+                crossed |= is_face && crosses(&rod.ends, &feature.corners) && !feature.lets_through(holes, tool);
             });
         }
         crossed
+    }
+
+    /// The meeting of a rod with a feature, if the rod's axis is in front of it.
+    fn meeting(&self, rod: &Rod, Pinned { organ, corners, side, .. }: &Pinned) -> Option<Meeting> {
+        let [p, q] = match side {
+            Side::Face(_) => nearest_to_triangle(&rod.ends, corners)?,
+            Side::Rim(rim) => {
+                let edge = [corners[0], corners[1]];
+                let [s, t] = nearest_of_segments(rod.ends, edge);
+                // The ends of an edge are rims of their own.
+                if !self.rims[*rim].is_vertex() && (t <= 0.0 || t >= 1.0) {
+                    return None;
+                }
+                [rod.ends[0].lerp(rod.ends[1], s), edge[0].lerp(edge[1], t)]
+            }
+        };
+        let normal = (p - q).try_normalize()?;
+        let in_front = match side {
+            Side::Face(outward) => normal.dot(*outward) >= LEAST_COSINE,
+            Side::Rim(rim) => self.rims[*rim].leads_out(normal, &self.places),
+        };
+        let gap = p.distance(q) - rod.radius;
+        let point = q + 0.5 * gap * normal;
+        in_front.then_some(Meeting { point, normal, gap, room: ROOM * rod.radius, organ: Some(*organ) })
     }
 
     /// Calls `found` for the features whose boxes are within `reach` (m) of a segment.
@@ -184,39 +201,23 @@ impl PinnedSurface {
     }
 }
 
-/// A vertex of a surface.
-#[derive(Clone, Copy)]
-struct Vertex {
-    /// The node that it is, or that bears most of it: for holes.
-    node: u32,
-    place: DVec3,
-    is_pinned: bool,
-}
-
-impl Vertex {
-    /// Vertex `i` of the collision surface of `organ`, or its node `i` without one.
-    fn of(world: &World, organ: usize, i: u32) -> Self {
-        let body = &world.model.bodies()[organ];
-        let pinned = |node: u32| body.pinned()[node as usize];
-        let Some(surface) = body.collision_surface() else {
-            let place = world.state.position(&world.model, organ, i as usize);
-            return Self { node: i, place, is_pinned: pinned(i) };
-        };
-        let (nodes, weights) = surface.nodes_of(i as usize);
-        let bearing = || nodes.into_iter().zip(weights).filter(|(_, weight)| *weight != 0.0);
-        let node = bearing().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(node, _)| node);
-        let place = world.state.collision_position(&world.model, organ, i as usize);
-        Self { node, place, is_pinned: bearing().all(|(node, _)| pinned(node)) }
+/// The nearest places of a segment and a triangle; None if the segment goes through it.
+fn nearest_to_triangle(ends: &[DVec3; 2], triangle: &[DVec3; 3]) -> Option<[DVec3; 2]> {
+    let [a, b, c] = *triangle;
+    // The nearest places are at an end of the segment or at an edge of the triangle, unless the
+    // segment goes through it.
+    let of_ends = ends.map(|p| [p, closest_on_triangle(triangle, p)]);
+    let of_edges = [[a, b], [b, c], [c, a]].map(|edge| {
+        let [s, t] = nearest_of_segments(*ends, edge);
+        [ends[0].lerp(ends[1], s), edge[0].lerp(edge[1], t)]
+    });
+    let mut best = of_ends[0];
+    for pair in of_ends.into_iter().chain(of_edges) {
+        if pair[0].distance(pair[1]) < best[0].distance(best[1]) {
+            best = pair;
+        }
     }
-}
-
-/// The mean of the unit normals of triangles, made a unit vector, if there is one.
-fn mean_normal(triangles: &[[u32; 3]], place: impl Fn(u32) -> DVec3) -> Option<DVec3> {
-    let normal = |t: &[u32; 3]| {
-        let [a, b, c] = t.map(&place);
-        (b - a).cross(c - a).normalize_or_zero()
-    };
-    triangles.iter().map(normal).sum::<DVec3>().try_normalize()
+    (!crosses(ends, triangle)).then_some(best)
 }
 
 /// Appends the tree over `features`, the first of which is number `first`.
@@ -260,37 +261,6 @@ fn near_box([from, to]: &[DVec3; 2], reach: f64, node: &Node) -> bool {
     begin <= end
 }
 
-/// The meeting of a rod with a feature, if the rod's axis is in front of it.
-fn meeting(rod: &Rod, Pinned { organ, corners, outward, rim, .. }: &Pinned) -> Option<Meeting> {
-    let [a, b, c] = *corners;
-    let mut best: Option<(f64, DVec3, DVec3)> = None;
-    let mut add = |p: DVec3, q: DVec3| {
-        let distance = p.distance(q);
-        if best.is_none_or(|(least, ..)| distance < least) {
-            best = Some((distance, p, q));
-        }
-    };
-    // The nearest places are at an end of the axis or at an edge of the triangle, unless the axis
-    // goes through it.
-    for p in rod.ends {
-        add(p, closest_on_triangle(corners, p));
-    }
-    for edge in [[a, b], [b, c], [c, a]] {
-        let [s, t] = nearest_of_segments(rod.ends, edge);
-        add(rod.ends[0].lerp(rod.ends[1], s), edge[0].lerp(edge[1], t));
-    }
-    let (distance, p, q) = best?;
-    if crosses(&rod.ends, corners) {
-        return None;
-    }
-    let normal = (p - q).try_normalize()?;
-    if normal.dot(*outward) < if rim.is_some() { 0.0 } else { LEAST_COSINE } {
-        return None;
-    }
-    let gap = distance - rod.radius;
-    Some(Meeting { point: q + 0.5 * gap * normal, normal, gap, room: ROOM * rod.radius, organ: Some(*organ) })
-}
-
 /// Whether a segment goes through a triangle.
 fn crosses(ends: &[DVec3; 2], triangle: &[DVec3; 3]) -> bool {
     let [a, b, c] = *triangle;
@@ -313,7 +283,7 @@ mod tests {
         let mesh = block([1; 3], 0.01).boundary().0;
         let vertex = |node: u32| {
             let place = mesh.vertices[node as usize] - 5e-3;
-            Vertex { node, place, is_pinned: pinned(place) }
+            SurfaceVertex { node, place, is_pinned: pinned(place) }
         };
         let mut surface = PinnedSurface::default();
         surface.add(0, &mesh.triangles, vertex);
@@ -345,7 +315,8 @@ mod tests {
         let face = cube_pinned(|p| p.z > 0.0);
         assert_eq!(face.features.len(), 2 + 4 + 4);
         assert!(near(gap(&face, [1.0, 2.0, 5.4]), -0.6));
-        assert!(near(gap(&face, [5.4, 1.0, 5.3]), -0.5), "the rim pushes what its face does not");
+        let beside = gap(&face, [5.4, 1.0, 5.1]);
+        assert!(near(beside, 0.17_f64.sqrt() - 1.0), "the rim pushes what its face does not: {beside:?}");
         assert!(cube_pinned(|_| false).features.is_empty());
         assert_eq!(cube_pinned(|_| true).features.len(), 12, "no rim");
     }
