@@ -56,10 +56,12 @@ pub(crate) fn for_each_with<T: Send, U: Send>(
     }
 }
 
-/// Calls `work` with parts of at least `least` items, at most eight of equal size, and the number
-/// of each part's first one.
+/// Calls `work` with two, four or eight parts of equal size and of at least `least` items, or with
+/// all items, and the number of each part's first one. Three parts would keep two threads as long
+/// as four.
 pub(crate) fn in_parts<T: Send>(items: &mut [T], least: usize, work: impl Fn(usize, &mut [T]) + Send + Sync) {
     let parts = (items.len() / least).clamp(1, MAX_PARTS);
+    let parts = 1 << parts.ilog2();
     if parts == 1 || !has_threads() {
         return work(0, items);
     }

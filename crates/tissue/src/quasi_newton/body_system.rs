@@ -19,7 +19,7 @@ use fearless_simd::{Level, SimdBase, dispatch, f32x4};
 use glam::Vec3A;
 
 /// Fewest nodes whose gradient is worth a thread of its own.
-const MIN_NODES: usize = 2500;
+const MIN_NODES: usize = 1000;
 
 /// Sweeps a substep for a body that the quasi-Newton steps gave up.
 const FALLBACK_SWEEPS: usize = 20;

@@ -12,7 +12,7 @@ use fearless_simd::{Level, dispatch};
 const BLOCK: usize = 1024;
 
 /// Fewest blocks, and fewest rows, that are worth a thread of their own.
-const MIN_BLOCKS: usize = 3;
+const MIN_BLOCKS: usize = 2;
 pub(super) const MIN_ROWS: usize = MIN_BLOCKS * BLOCK;
 
 /// Most blocks of the products of a pair with itself; they are larger for a large body.

@@ -19,7 +19,7 @@ pub(super) struct Warp {
 }
 
 /// Fewest groups of sixteen nodes that are worth a thread of their own.
-const MIN_GROUPS: usize = 160;
+const MIN_GROUPS: usize = 64;
 
 /// A neighbourhood squeezed below this volume ratio has no reliable rotation.
 const MIN_VOLUME_RATIO: f32 = 0.01;
