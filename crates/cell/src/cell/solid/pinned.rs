@@ -4,8 +4,9 @@
 //! The tissue's own step finds contacts of points that move. It has none for pinned ones, so they
 //! would let an instrument pass. Here such a triangle is a solid for the instrument's axis on its
 //! outer side, with no margin: an instrument that lies beside it is not touched. Triangles with a
-//! vertex that moves belong to the tissue's contact. Its stiffness falls to 0 at a pinned vertex and
-//! at an edge between two, so these are solids, too, where such a triangle begins ([`super::rim`]).
+//! vertex that moves belong to the tissue's contact. Its stiffness falls to 0 at a pinned vertex
+//! and at an edge between two, so these are solids, too, where such a triangle begins
+//! ([`super::rim`]).
 
 use super::meeting::{Deepest, Meeting, REACH};
 use super::rim::{Rim, RimPlaces};
