@@ -33,15 +33,26 @@ fn commands(help: &str) -> Vec<String> {
     names.filter(|name| name != "help").collect()
 }
 
+/// The pages of the docs that list commands.
+fn lists_of_commands() -> String {
+    let guides = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/guides");
+    ["commands.md", "studies.md"].map(|page| std::fs::read_to_string(guides.join(page)).unwrap()).concat()
+}
+
 #[test]
-fn the_help_of_every_command() {
-    let here = TempDir::new().unwrap();
+fn every_command_has_help_and_is_in_the_docs() {
+    let (here, lists) = (TempDir::new().unwrap(), lists_of_commands());
     let mut open: Vec<Vec<String>> = vec![Vec::new()];
     let mut count = 0;
     while let Some(path) = open.pop() {
         let mut arguments: Vec<&str> = path.iter().map(String::as_str).collect();
         arguments.push("--help");
         let help = String::from_utf8(trocar(here.path(), &arguments).stdout).unwrap().replace("trocar.exe", "trocar");
+        assert!(
+            lists.contains(&["trocar", &path.join(" ")].join(" ")),
+            "the docs do not list `trocar {}`",
+            path.join(" ")
+        );
         open.extend(commands(&help).into_iter().map(|name| [&path[..], &[name]].concat()));
         check(&["help".to_owned()].iter().chain(&path).cloned().collect::<Vec<_>>().join("-"), &help);
         count += 1;
