@@ -200,7 +200,7 @@ impl Shape {
 /// number of a part's first one.
 fn sum_of_parts<T: Sync>(batches: &[T], of: impl Fn(usize, &[T]) -> Shape + Send + Sync) -> Shape {
     let (mut parts, count) = ([Shape::NONE; MAX_PARTS], batches.len());
-    let used = (count / MIN_PART).clamp(1, MAX_PARTS);
+    let used = 1 << (count / MIN_PART).clamp(1, MAX_PARTS).ilog2();
     in_parts(&mut parts[..used], 1, |first, parts| {
         for (k, part) in (first..).zip(parts) {
             let begin = count * k / used;

@@ -56,17 +56,25 @@ pub(crate) fn for_each_with<T: Send, U: Send>(
     }
 }
 
-/// Calls `work` with two, four or eight parts of equal size and of at least `least` items, or with
-/// all items, and the number of each part's first one. Three parts would keep two threads as long
-/// as four.
+/// Calls `work` with two, four or eight parts of at least `least` items, or with all items, and the
+/// number of each part's first one. Parts are of equal size, and there are never three: two threads
+/// need two thirds of the time for three parts, and half of it for two or four.
 pub(crate) fn in_parts<T: Send>(items: &mut [T], least: usize, work: impl Fn(usize, &mut [T]) + Send + Sync) {
-    let parts = (items.len() / least).clamp(1, MAX_PARTS);
-    let parts = 1 << parts.ilog2();
+    let parts = 1 << (items.len() / least).clamp(1, MAX_PARTS).ilog2();
     if parts == 1 || !has_threads() {
         return work(0, items);
     }
-    let size = items.len().div_ceil(parts);
-    section(|| items.par_chunks_mut(size).enumerate().for_each(|(k, part)| work(k * size, part)));
+    section(|| in_halves(items, parts, 0, &work));
+}
+
+/// Calls `work` with so many `parts` of items, a power of two; the first item has a number.
+fn in_halves<T: Send>(items: &mut [T], parts: usize, first: usize, work: &(impl Fn(usize, &mut [T]) + Sync)) {
+    if parts == 1 {
+        return work(first, items);
+    }
+    let middle = items.len() / 2;
+    let (one, other) = items.split_at_mut(middle);
+    rayon::join(|| in_halves(one, parts / 2, first, work), || in_halves(other, parts / 2, first + middle, work));
 }
 
 /// Does both, on two threads of the pool that calls if both are free.

@@ -101,6 +101,7 @@ impl PinnedSurface {
             }
         }
         build(&mut surface.features, 0, &mut surface.nodes);
+        surface.places.finish();
         surface
     }
 
@@ -311,6 +312,12 @@ mod tests {
         let edge = cube_pinned(|p| p.x > 0.0 && p.y > 0.0);
         assert_eq!(edge.features.len(), 3, "an edge and its two vertices");
         assert!(near(gap(&edge, [5.3, 5.4, 0.0]), -0.5));
+        let pushing = |place: [f64; 3]| {
+            let rod = Rod { ends: [1e-3 * DVec3::from(place); 2], radius: 1e-3, part: 0 };
+            edge.features.iter().filter(|feature| edge.meeting(&rod, feature).is_some()).count()
+        };
+        assert_eq!(pushing([5.3, 5.4, 5.2]), 1, "beyond its end an edge does not push, its vertex does");
+        assert_eq!(pushing([5.3, 5.4, 4.8]), 2);
         // A face of two triangles, its outer edges and its corners. No triangle at the diagonal
         // moves.
         let face = cube_pinned(|p| p.z > 0.0);

@@ -16,6 +16,7 @@ pub(super) struct RimPlaces {
     vertices: Vec<(usize, u32)>,
     /// (m)
     places: Vec<DVec3>,
+    /// Numbers of the vertices, while rims are added.
     known: BTreeMap<(usize, u32), usize>,
 }
 
@@ -27,6 +28,11 @@ impl RimPlaces {
             self.places.push(place);
             self.places.len() - 1
         })
+    }
+
+    /// No more rims are added.
+    pub fn finish(&mut self) {
+        self.known = BTreeMap::new();
     }
 
     /// Reads where the vertices are now.
@@ -84,7 +90,11 @@ impl Rim {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests may panic")]
+
     use super::*;
+    use trocar_testing::tube::{ONE_END, two_tubes};
+    use trocar_tissue::SolverSettings;
 
     /// A pinned square in z = 0 with x < 0, and a square that moves with x > 0, at whose far side z
     /// is `far`. The rim is the edge along y and its vertices.
@@ -112,5 +122,39 @@ mod tests {
         assert!(leads_out([1, 4], -3.0, 1.0, -0.5) && !leads_out([1, 4], -3.0, -1.0, 0.1));
         // It is lifted: no push into it.
         assert!(!leads_out([1, 4], 3.0, 1.0, 0.5) && leads_out([1, 4], 3.0, -1.0, 0.5));
+    }
+
+    /// A vertex at the foot of a wall on a floor. The wall's face is split into many triangles.
+    #[test]
+    fn a_vertex_does_not_count_the_triangles_of_a_face() {
+        let mut places = RimPlaces::default();
+        // Floor z = 0 for y < 0, seen from above; wall y = 0 for z < 0, seen from y > 0.
+        let fan = |k: u32| 0.5 * std::f64::consts::PI * f64::from(k) / 16.0;
+        let place = |i: u32| match i {
+            0 => DVec3::ZERO,
+            1 => -DVec3::Y,
+            _ => DVec3::new(libm::cos(fan(i - 2)), 0.0, -libm::sin(fan(i - 2))),
+        };
+        let mut around = vec![[0, 1, 2]];
+        around.extend((2..18).map(|i| [0, i, i + 1]));
+        let rim = Rim::new(0, [0, 0], &around, place, &mut places);
+        // Both faces have a right angle there, so the sides of the half-space are alike.
+        assert!(
+            rim.leads_out(DVec3::new(0.0, -0.9, 1.0), &places) && rim.leads_out(DVec3::new(0.0, 1.0, -0.9), &places)
+        );
+        assert!(
+            !rim.leads_out(DVec3::new(0.0, -1.0, 0.9), &places) && !rim.leads_out(DVec3::new(0.0, 0.9, -1.0), &places)
+        );
+    }
+
+    #[test]
+    fn places_follow_the_tissue() {
+        let world = World::new(&two_tubes(ONE_END, 4e-3), SolverSettings::default(), 1).unwrap();
+        let mut places = RimPlaces::default();
+        let numbers = [(0, 3), (1, 5), (0, 3)].map(|(organ, vertex)| places.number(organ, vertex, DVec3::ZERO));
+        assert_eq!(numbers, [0, 1, 0]);
+        places.follow(&world);
+        let now = [(0, 3), (1, 5)].map(|(organ, node)| world.state.position(&world.model, organ, node));
+        assert!(places.places == now && now[0] != DVec3::ZERO);
     }
 }
