@@ -258,3 +258,57 @@ fn jaws_open_until_pinned_tissue_holds_them() {
     let free = go(&mut cell, 0.03, 1.0, 45);
     assert!(free.last().unwrap().arms[0].measured.jaw() > 0.99);
 }
+
+#[test]
+fn a_start_in_an_organ_is_drawn_back_along_the_shaft() {
+    for pins in [Pins::Band { share: 1.0 }, ONE_END] {
+        let specimen = meshed(pins, 2.2e-3);
+        for free in [false, true] {
+            let mut scene = scene();
+            scene.task.organ = "tube".to_owned();
+            if free {
+                scene.arms = vec![Arm::free(Side::Left, "grasper", [0.0, 0.46, 0.12])];
+                scene.instruments.truncate(1);
+            }
+            let outside = Cell::new(&scene, &specimen, 1).unwrap();
+            // The closed blades' tips 5 mm below the top of the tube.
+            let tip = outside.measured_cp("left").unwrap();
+            let inside = DVec3::new(0.0, 0.46, TUBE_TOP + 0.016);
+            let inside =
+                outside.solve("left", &Pose { translation: inside, ..tip }, &outside.setpoint("left").unwrap());
+            let start = inside.unwrap().setpoint.with_jaw(0.0);
+            let mut starts: Vec<Setpoint> = outside.observe().iter().map(|a| a.commanded).collect();
+            starts[0] = start;
+            let mut cell = Cell::new(&scene, &specimen, 1).unwrap();
+            cell.restart(&outside.save(), &starts).unwrap();
+            let now = cell.observe()[0].commanded;
+            let back = match free {
+                true => now.0[2] - start.0[2],
+                false => start.0[2] - now.0[2],
+            };
+            assert!(back > 0.003 && back < 0.012, "by {back} m");
+            let reports = rest(&mut cell, 10);
+            assert!(reports.iter().all(|r| r.rules.pierced == 0) && !cell.axes_inside()[0]);
+            assert!(most(&reports, |r| r.arms[0].solid_peak) == 0.0, "the organ does not push it");
+            // The next restart knows nothing of this one, and a start outside stays.
+            let mut again = Cell::new(&scene, &specimen, 1).unwrap();
+            again.restart(&outside.save(), &starts).unwrap();
+            cell.restart(&outside.save(), &starts).unwrap();
+            assert_eq!(cell.hash(), again.hash());
+            cell.restart(&outside.save(), &[now, starts[starts.len() - 1]][..starts.len()]).unwrap();
+            assert_eq!(cell.observe()[0].commanded, now);
+        }
+    }
+}
+
+#[test]
+fn a_scene_whose_start_is_in_an_organ_begins_out_of_it() {
+    let specimen = meshed(Pins::Band { share: 1.0 }, 2.2e-3);
+    let mut scene = scene();
+    scene.task.organ = "tube".to_owned();
+    scene.instruments.truncate(1);
+    scene.arms = vec![Arm::free(Side::Left, "grasper", [0.0, 0.46, TUBE_TOP + 0.016])];
+    scene.arms[0].start.jaw = 0.0;
+    let cell = Cell::new(&scene, &specimen, 1).unwrap();
+    assert!(!cell.axes_inside()[0] && cell.observe()[0].commanded.0[2] > TUBE_TOP + 0.02);
+}

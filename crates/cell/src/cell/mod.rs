@@ -139,8 +139,8 @@ pub struct Cell {
 
 impl Cell {
     /// The cell of `scene` around `specimen`, whose tissue is stepped by `threads` threads (0: as
-    /// many as the machine has). The arms are in their start poses, the organs as recorded. Results
-    /// do not depend on the threads.
+    /// many as the machine has). The arms are in their start poses, the organs as recorded. A start
+    /// in an organ is drawn back along the shaft. Results do not depend on the threads.
     ///
     /// # Errors
     /// Names the field of the scene, or the organ, arm or instrument that cannot be used.
@@ -158,7 +158,7 @@ impl Cell {
         start::check(scene, &placed)?;
         let Placed { specimen, mut surroundings, floor } = placed;
         let bed = surroundings.bed_friction.map(|_| floor);
-        let arms = build::arms(scene, floor)?;
+        let mut arms = build::arms(scene, floor)?;
         let colliders = arms.iter().flat_map(|s| s.model.blades.colliders(s.model.tools));
         let colliders = colliders.filter(|_| contact.instruments).collect();
         if !contact.organs {
@@ -167,6 +167,10 @@ impl Cell {
         let schedule = build::schedule(scene.tissue.schedule);
         let world = World::surrounded(&specimen, &surroundings, colliders, schedule, threads)?;
         let pinned = PinnedSurface::felt(&world, contact);
+        for arm in &mut arms {
+            let start = arm.state.commanded;
+            arm.begin(&start, &world)?;
+        }
         Ok(Self {
             motions: Vec::with_capacity(3 * arms.len()),
             edges: Edges::of(&world),

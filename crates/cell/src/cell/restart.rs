@@ -1,6 +1,5 @@
 //! Restarts an existing cell: arms elsewhere, tissue as it was saved, time zero.
 
-use super::arm::ArmState;
 use super::setpoint::Setpoint;
 use super::{Cell, CellState, build};
 use crate::{Error, Result};
@@ -15,8 +14,9 @@ impl Cell {
     }
 
     /// Restores the tissue of `state` without grasps and holes, puts the arms at rest at `starts`
-    /// (one for each arm), and sets the time to zero. The same state and starts give the same bits,
-    /// whatever the cell did before.
+    /// (one for each arm), and sets the time to zero. A start in an organ is drawn back along the
+    /// shaft until the instrument's axes are out of it. The same state and starts give the same
+    /// bits, whatever the cell did before.
     ///
     /// # Errors
     /// A state of another cell, or a start out of an arm's reach. The cell then has to be restored
@@ -29,14 +29,9 @@ impl Cell {
         self.restore(state)?;
         self.world.state.holes.clear();
         for (arm, start) in self.arms.iter_mut().zip(starts) {
-            arm.drive.restart(start)?;
             let tool = arm.model.tools.gripper;
             self.world.state.grasps.retain(|g| g.tool != tool);
-            let (mut jaw, mut scissors) = (arm.state.jaw, arm.state.scissors);
-            jaw.rest();
-            scissors.rest();
-            let (pose, design) = (arm.drive.tip(), arm.state.design);
-            arm.state = ArmState::new(pose, &arm.model, *start, design, jaw, scissors);
+            arm.begin(start, &self.world)?;
         }
         self.waiting.0.clear();
         self.periods = 0;

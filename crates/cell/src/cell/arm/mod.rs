@@ -1,5 +1,6 @@
 //! One arm of the cell: its drive, its instrument in the tissue, and its grasp.
 
+mod begin;
 mod jaws;
 mod shears;
 mod state;
