@@ -4,7 +4,7 @@
 
 use super::supernode::TILE_SIZE;
 use fearless_simd::{
-    Bytes, Simd, SimdBase, SimdCvtFloat, SimdCvtTruncate, SimdFloat, SimdIntWiden, SimdSplit, SimdWiden, f32x16, i8x64,
+    Bytes, Simd, SimdBase, SimdCvtFloat, SimdCvtTruncate, SimdIntWiden, SimdSplit, SimdWiden, f32x16, i8x64,
     i16x32, i32x16,
 };
 
@@ -16,6 +16,11 @@ const MAX_INT16: f32 = 32767.0;
 
 /// Numbers that are all smaller than this count as 0.
 const MIN_GREATEST: f32 = 1e-30;
+
+/// 1.5 * 2^23: a number up to 2^22 plus this is whole, the nearest (the even one of two), and the
+/// sum's last bits are those of the whole number. It is quicker than to round and to convert, and
+/// SSE2 has no instruction that rounds.
+const WHOLE: f32 = 12_582_912.0;
 
 /// Column k is paired with column k + 8.
 const PAIRS: usize = TILE_SIZE / 2;
@@ -42,8 +47,8 @@ impl Tile {
         let [mut tile, mut remainder] = [Self::ZERO; 2];
         for pair in 0..PAIRS {
             let [first, second] = [pair, pair + PAIRS].map(|number| column(number) * Self::UNIT);
-            let [whole, other] = [first.round_ties_even(), second.round_ties_even()];
-            let [left, right] = [first - whole, second - other].map(|x| (x * Self::REMAINDER_UNIT).round_ties_even());
+            let [whole, other] = [first, second].map(nearest_whole);
+            let [left, right] = [first - whole, second - other].map(|x| nearest_whole(x * Self::REMAINDER_UNIT));
             let place = 2 * TILE_SIZE * pair..2 * TILE_SIZE * (pair + 1);
             store_bytes(simd, [whole, other], &mut tile.numbers[place.clone()]);
             store_bytes(simd, [left, right], &mut remainder.numbers[place]);
@@ -63,10 +68,11 @@ impl Tile {
         sums[0] + sums[1]
     }
 
-    /// Adds the products of the tile's columns with `x`, lane by lane; the caller needs their sums
-    /// over lanes.
+    /// Adds the products of the tile's columns with `x`, as [`round`] left it, lane by lane; the
+    /// caller needs their sums over lanes.
     #[inline(always)]
-    pub fn add_transposed<S: Simd>(&self, simd: S, x: i32x16<S>, sums: &mut [i32x16<S>; TILE_SIZE]) {
+    pub fn add_transposed<S: Simd>(&self, simd: S, x: &[f32], sums: &mut [i32x16<S>; TILE_SIZE]) {
+        let x: i32x16<S> = f32x16::from_slice(simd, x).bitcast();
         let first: i16x32<S> = (x & 0xffff).bitcast();
         let second: i16x32<S> = (x << 16).bitcast();
         for q in 0..4 {
@@ -77,6 +83,12 @@ impl Tile {
             sums[2 * q + 1 + PAIRS] += next.pairwise_dot_product(second);
         }
     }
+}
+
+/// The nearest whole numbers.
+#[inline(always)]
+fn nearest_whole<S: Simd>(x: f32x16<S>) -> f32x16<S> {
+    (x + WHOLE) - WHOLE
 }
 
 /// Stores whole numbers of two columns, row by row.
@@ -96,14 +108,15 @@ pub(super) type Pairs = [i32; PAIRS];
 #[inline(always)]
 pub(super) fn pairs<S: Simd>(x: f32x16<S>) -> (Pairs, f32) {
     let most = x.abs().reduce_max();
-    let (first, second) = i32x16::truncate_from((x * per_unit(most, MAX_INT16)).round_ties_even()).split();
+    let whole: i32x16<S> = (x * per_unit(most, MAX_INT16) + WHOLE).bitcast();
+    let (first, second) = whole.split();
     let mut pairs = [0; PAIRS];
     (first & 0xffff | second << 16).store_slice(&mut pairs);
     (pairs, most / MAX_INT16)
 }
 
-/// Rounds the numbers of `x`, times `scales`, to whole ones in place. Returns what these are
-/// multiplied by. Sums of their products with a column of tiles fit in 32 bits.
+/// Rounds the numbers of `x`, times `scales`, to whole ones plus [`WHOLE`] in place. Returns what
+/// the whole ones are multiplied by. Sums of their products with a column of tiles fit in 32 bits.
 #[inline(always)]
 pub(super) fn round<S: Simd>(simd: S, x: &mut [f32], scales: &[f32]) -> f32 {
     let tiles = x.len() / TILE_SIZE;
@@ -117,7 +130,7 @@ pub(super) fn round<S: Simd>(simd: S, x: &mut [f32], scales: &[f32]) -> f32 {
     let most = most.reduce_max();
     let per_unit = per_unit(most, limit);
     for x in x.chunks_exact_mut(TILE_SIZE) {
-        (f32x16::from_slice(simd, x) * per_unit).round_ties_even().store_slice(x);
+        (f32x16::from_slice(simd, x) * per_unit + WHOLE).store_slice(x);
     }
     most / limit
 }
@@ -149,7 +162,7 @@ pub(super) fn transpose_sum<S: Simd>(simd: S, sums: &[i32x16<S>; TILE_SIZE]) -> 
 mod tests {
     use super::{TILE_SIZE, Tile, pairs, round, transpose_sum};
     use crate::Isa;
-    use fearless_simd::{Level, SimdBase, SimdCvtFloat, SimdCvtTruncate, dispatch, f32x16, i32x16};
+    use fearless_simd::{Level, SimdBase, SimdCvtFloat, dispatch, f32x16, i32x16};
 
     fn number(row: usize, column: usize) -> f32 {
         ((37 * column + 11 * row) % 41) as f32 / 20.0 - 1.0
@@ -176,7 +189,7 @@ mod tests {
             let mut rounded = x;
             let unit_transposed = round(simd, &mut rounded, &[1.0; TILE_SIZE]);
             let mut sums = [i32x16::splat(simd, 0); TILE_SIZE];
-            tile.add_transposed(simd, i32x16::truncate_from(f32x16::from_slice(simd, &rounded)), &mut sums);
+            tile.add_transposed(simd, &rounded, &mut sums);
             let transposed = transpose_sum(simd, &sums);
             for k in 0..TILE_SIZE {
                 let row: f32 = (0..TILE_SIZE).map(|c| number(k, c) * x[c]).sum();
@@ -200,7 +213,7 @@ mod tests {
                 let unit = round(simd, &mut x, &vec![1.0; TILE_SIZE * tiles]);
                 let mut sums = [i32x16::splat(simd, 0); TILE_SIZE];
                 for x in x.chunks_exact(TILE_SIZE) {
-                    ones.add_transposed(simd, i32x16::truncate_from(f32x16::from_slice(simd, x)), &mut sums);
+                    ones.add_transposed(simd, x, &mut sums);
                 }
                 transpose_sum(simd, &sums)[0] * unit / Tile::UNIT
             })

@@ -17,7 +17,7 @@ use super::tile::{Tile, pairs, round, transpose_sum};
 use super::tile_parts::{Part, Parts};
 use super::tree::Tree;
 use crate::threads::for_each;
-use fearless_simd::{Level, Simd, SimdBase, SimdCvtFloat, SimdCvtTruncate, dispatch, f32x16, i32x16};
+use fearless_simd::{Level, Simd, SimdBase, SimdCvtFloat, dispatch, f32x16, i32x16};
 use std::ops::Range;
 use trocar_sparse::Panel;
 
@@ -289,8 +289,8 @@ impl Tiles {
         *at = tiles.end;
     }
 
-    /// Sum over a column of tiles, the first of them at `at`, of tile' times its part of `x`, whole
-    /// numbers; without the columns' scales.
+    /// Sum over a column of tiles, the first of them at `at`, of tile' times its part of `x`, as
+    /// [`round`] left it; without the columns' scales.
     #[inline(always)]
     fn transposed<S: Simd>(&self, simd: S, at: usize, x: &[f32], precise: bool) -> f32x16<S> {
         let mut sum = sum_transposed(simd, &self.tiles[at..], x);
@@ -301,12 +301,12 @@ impl Tiles {
     }
 }
 
-/// Sum of tile' times its part of `x`, whole numbers, over as many `tiles` as `x` has parts.
+/// Sum of tile' times its part of `x`, as [`round`] left it, over as many `tiles` as `x` has parts.
 #[inline(always)]
 fn sum_transposed<S: Simd>(simd: S, tiles: &[Tile], x: &[f32]) -> f32x16<S> {
     let mut sums = [i32x16::splat(simd, 0); TILE_SIZE];
     for (tile, x) in tiles.iter().zip(x.chunks_exact(TILE_SIZE)) {
-        tile.add_transposed(simd, i32x16::truncate_from(f32x16::from_slice(simd, x)), &mut sums);
+        tile.add_transposed(simd, x, &mut sums);
     }
     transpose_sum(simd, &sums)
 }
