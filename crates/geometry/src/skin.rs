@@ -2,7 +2,7 @@
 
 mod box_grid;
 
-use crate::{TetMesh, TriMesh};
+use crate::{TetMesh, TriMesh, closest_on_triangle};
 use box_grid::BoxGrid;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -67,7 +67,7 @@ impl Skin {
             if let Some((_, t, weights)) = inside {
                 return (t, weights);
             }
-            let to = |k: u32| closest_on_triangle(p, &triangles[k as usize]);
+            let to = |k: u32| closest_on_triangle(&triangles[k as usize], p);
             match shell.nearest(p, |k| to(k).distance(p)) {
                 Some(k) => {
                     let frame = &frames[outside.tets[k as usize] as usize];
@@ -121,21 +121,6 @@ fn limited(near: [f64; 4], wanted: [f64; 4]) -> [f64; 4] {
         }
     }
     [0, 1, 2, 3].map(|i| near[i] + share * (wanted[i] - near[i]))
-}
-
-/// The point of a triangle nearest to `p`: the projection onto its plane if that lies inside, or
-/// else the nearest point of the edges.
-fn closest_on_triangle(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> DVec3 {
-    let normal = (b - a).cross(c - a);
-    let foot = p - normal * ((p - a).dot(normal) / normal.length_squared());
-    let within = |u: DVec3, v: DVec3| (v - u).cross(foot - u).dot(normal) >= 0.0;
-    if within(a, b) && within(b, c) && within(c, a) {
-        return foot;
-    }
-    let on_edge = |u: DVec3, v: DVec3| u.lerp(v, ((p - u).dot(v - u) / (v - u).length_squared()).clamp(0.0, 1.0));
-    let [first, second, third] = [on_edge(a, b), on_edge(b, c), on_edge(c, a)];
-    let nearer = |u: DVec3, v: DVec3| if v.distance_squared(p) < u.distance_squared(p) { v } else { u };
-    nearer(nearer(first, second), third)
 }
 
 #[cfg(test)]
@@ -197,13 +182,13 @@ mod tests {
             let skin = Skin::bind(&points, &body);
             for (p, (t, weights)) in points.vertices.iter().zip(&skin.bindings) {
                 let nearest = |triangle: &[u32; 3]| {
-                    closest_on_triangle(*p, &triangle.map(|i| surface.vertices[i as usize])).distance(*p)
+                    closest_on_triangle(&triangle.map(|i| surface.vertices[i as usize]), *p).distance(*p)
                 };
                 let truth = surface.triangles.iter().map(nearest).fold(f64::INFINITY, f64::min);
                 let [a, b, c, d] = body.corners(*t as usize);
                 let found = [[b, c, d], [a, d, c], [a, b, d], [a, c, b]]
                     .iter()
-                    .map(|triangle| closest_on_triangle(*p, triangle).distance(*p))
+                    .map(|triangle| closest_on_triangle(triangle, *p).distance(*p))
                     .fold(f64::INFINITY, f64::min);
                 assert!((found - truth).abs() < 1e-12, "radius {radius}: {found} instead of {truth}");
                 assert!(weights.iter().all(|w| (-3.0 - 1e-9..=4.0 + 1e-9).contains(w)));

@@ -16,6 +16,7 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use trocar_core::Progress;
+use trocar_workflow::counted;
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 /// The file in the output folder.
@@ -47,9 +48,10 @@ pub struct Resumed {
     pub put_aside: Option<String>,
 }
 
-/// Sentences about an earlier run; `what` names the trials.
+/// Sentences about an earlier run; `what` names one of the trials.
 pub(crate) fn resumed(resumed: &Resumed, what: &str) -> Vec<String> {
-    let earlier = (resumed.trials > 0).then(|| format!("{} {what} of an earlier run were used again", resumed.trials));
+    let earlier =
+        (resumed.trials > 0).then(|| format!("Used again: {} of an earlier run", counted(resumed.trials, what)));
     earlier.into_iter().chain(resumed.put_aside.clone()).collect()
 }
 

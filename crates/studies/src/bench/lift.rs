@@ -384,7 +384,7 @@ fn document(r: &LiftResult) -> Document {
     let lead = "From the first contact of the jaws to their release. The time of a frame is its median over the \
                 rounds. Six: a frame of drag of six organs with as many elements in all.";
     let machine = format!("{} threads on {}", r.threads, r.machine.described());
-    let said = r.skipped.iter().cloned().chain(resumed(&r.resumed, "organs")).chain([machine]);
+    let said = r.skipped.iter().cloned().chain(resumed(&r.resumed, "organ")).chain([machine]);
     Document::new("Lift", "Cost of one whole organ in the jaws")
         .with(Section::new("Organs", lead).table(table).lines(said))
         .with(Section::new("Phases", "").table(phases))

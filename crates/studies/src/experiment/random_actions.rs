@@ -272,5 +272,5 @@ fn document(r: &RandomActionsResult) -> Document {
     );
     Document::new("Random actions", "Failures under random valid actions")
         .with(Section::new("Random actions", lead).cards(cards))
-        .with(Section::new("Seeds", "").table(table).lines(resumed(&r.resumed, "seeds")))
+        .with(Section::new("Seeds", "").table(table).lines(resumed(&r.resumed, "seed")))
 }

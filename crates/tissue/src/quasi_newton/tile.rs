@@ -4,8 +4,8 @@
 
 use super::supernode::TILE_SIZE;
 use fearless_simd::{
-    Bytes, Simd, SimdBase, SimdCvtFloat, SimdCvtTruncate, SimdIntWiden, SimdSplit, SimdWiden, f32x16, i8x64,
-    i16x32, i32x16,
+    Bytes, Simd, SimdBase, SimdCvtFloat, SimdCvtTruncate, SimdIntWiden, SimdSplit, SimdWiden, f32x16, i8x64, i16x32,
+    i32x16,
 };
 
 /// Greatest number in 8 bits.

@@ -245,5 +245,5 @@ fn best(r: &ControllerGridResult) -> Section {
     );
     Section::new("The chosen and the best ten", "Sorted by the worst figure over its target.")
         .table(table)
-        .lines(resumed(&r.resumed, "configurations"))
+        .lines(resumed(&r.resumed, "configuration"))
 }

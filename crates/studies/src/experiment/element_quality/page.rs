@@ -25,7 +25,7 @@ pub(super) fn document(r: &ElementQualityResult) -> Result<Document> {
         count(r.tets),
         fixed(r.jaw_force_n, 2)
     );
-    let lines = std::iter::once(appendix).chain(resumed(&r.resumed, "cases"));
+    let lines = std::iter::once(appendix).chain(resumed(&r.resumed, "case"));
     Ok(document.with(Section::new("Settings", "").lines(lines)))
 }
 

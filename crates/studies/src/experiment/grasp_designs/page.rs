@@ -42,7 +42,7 @@ pub(super) fn document(r: &GraspDesignsResult) -> Result<Document> {
         r.lift_mm,
         r.jaw_force_n
     );
-    let lines = [columns, appendix].into_iter().chain(resumed(&r.resumed, "trials"));
+    let lines = [columns, appendix].into_iter().chain(resumed(&r.resumed, "trial"));
     Ok(document.with(Section::new("Settings", "").lines(lines)).with(trials(r)))
 }
 

@@ -23,7 +23,7 @@ pub(super) fn document(r: &IdentificationResult, phantoms: usize) -> Result<Docu
          as the prior's, if all others were known."
     );
     let mut section = Section::new("Identification", lead).cards(cards(r)).table(coverage(&r.coverage));
-    section = section.table(errors(&r.errors)).lines(resumed(&r.resumed, "fits"));
+    section = section.table(errors(&r.errors)).lines(resumed(&r.resumed, "fit"));
     let plots = Parameter::ALL.into_iter().map(|p| intervals(r, p)).collect::<Result<Vec<_>>>()?;
     let said = "The 90% interval of each phantom over the true value, default fit, on the scale of the prior.";
     Ok(Document::new("Identification", "What lifts tell of support and tissue")

@@ -40,7 +40,7 @@ pub(super) fn document(r: &LiftsResult, film: Option<&HeldOutFilm>) -> Result<Do
         .cards(cards(r))
         .figures([heights(r)?, profiles(r)?])
         .table(recorded(r))
-        .lines(resumed(&r.resumed, "lifts"));
+        .lines(resumed(&r.resumed, "lift"));
     let trend = Section::new(
         "Half-drop distance over height",
         "Lifts straight up at three places, means. Residual: d50 less that of the paper's line at the same lift.",

@@ -50,7 +50,7 @@ pub(super) fn document(r: &MeshConvergenceResult) -> Result<Document> {
         section = plot(r, section, title, value, &ratios)?;
     }
     Ok(Document::new("Mesh convergence", "Deflections of an appendix over the size of its elements")
-        .with(section.table(table(r)).lines(resumed(&r.resumed, "meshes"))))
+        .with(section.table(table(r)).lines(resumed(&r.resumed, "row"))))
 }
 
 fn plot(r: &MeshConvergenceResult, section: Section, title: &str, value: Value, ratios: &[f64]) -> Result<Section> {

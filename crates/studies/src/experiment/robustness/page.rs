@@ -65,7 +65,7 @@ fn outcome(r: &RobustnessResult) -> Section {
         .chain(r.as_written().into_iter().flat_map(|row| row.policies.iter().map(|p| p.policy.clone())))
         .collect();
     let section = Section::new("Outcome", lead).cards(cards).table(Table::new(head, rows));
-    section.lines(resumed(&r.resumed, "conditions"))
+    section.lines(resumed(&r.resumed, "condition"))
 }
 
 fn summary(name: &str, row: &RobustnessRow) -> Vec<String> {
