@@ -15,14 +15,14 @@ use row::IntegratorRow;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
-use trocar_cell::World;
+use trocar_cell::{Surroundings, World};
 use trocar_core::Progress;
 use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
-use trocar_tissue::{Model, SolverSettings, State};
+use trocar_tissue::{BodyContact, Model, SolverSettings, State};
 use trocar_tissue_reference::{Oracle, OracleState, stable_explicit_step};
 use trocar_workflow::{check_interrupted, phantoms};
 
@@ -44,7 +44,7 @@ const TISSUE: (f64, f64) = (12e3, 0.45);
 #[derive(Clone, Debug, Args)]
 pub struct IntegratorsExperiment {
     /// Gmsh file (.msh, in metres, z up) with the organs, the lowest 42% of each pinned; by default
-    /// phantom A, reconstructed.
+    /// phantom A, reconstructed, without friction.
     #[arg(long, value_name = "FILE")]
     pub mesh: Option<PathBuf>,
     /// Simulated time (s).
@@ -99,7 +99,7 @@ impl Study for IntegratorsExperiment {
         job.claim()?;
         let (specimen, model) = match &organs {
             Some(organs) => (organs.source.clone(), self.pinned(organs)?),
-            None => ("phantom A, reconstructed".to_owned(), self.phantom(job)?),
+            None => ("phantom A, reconstructed, without friction".to_owned(), self.phantom(job)?),
         };
         let truth = Equilibrium::of(&model)?;
         let stable = stable_explicit_step(&model);
@@ -135,7 +135,8 @@ impl IntegratorsExperiment {
         Ok(BenchScene::sag(organs, trocar_tissue::Material { viscosity, ..tissue })?.model)
     }
 
-    /// Phantom A with the materials and supports of the cell.
+    /// Phantom A with the materials and supports of the cell, without friction: where tissue that
+    /// rubs comes to rest depends on the way there, and there is more than one equilibrium.
     fn phantom(&self, job: &Job<'_>) -> Result<Model> {
         if self.undamped {
             return Err(Error::Mismatch("--undamped needs --mesh: the organs of the cell are damped".to_owned()));
@@ -148,7 +149,12 @@ impl IntegratorsExperiment {
             phantoms::AfterUse::Keep,
             job.progress,
         )?;
-        Ok(World::new(&specimen, SolverSettings::default(), 1)?.model)
+        let surroundings = Surroundings {
+            body_contact: Some(BodyContact { friction: 0.0, ..BodyContact::default() }),
+            bed_friction: Some(0.0),
+            ..Surroundings::default()
+        };
+        Ok(World::surrounded(&specimen, &surroundings, Vec::new(), SolverSettings::default(), 1)?.model)
     }
 }
 
