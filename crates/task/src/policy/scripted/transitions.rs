@@ -9,8 +9,10 @@ use crate::judge::{Context, Memory};
 use trocar_scene::{Condition, TaskName};
 
 /// Open blades go no deeper where tissue presses them apart with this share of the jaws' force:
-/// they could not close. From the smaller share on the force is watched every period.
+/// they could not close. With every further try the share grows: blades that stop early at stiff
+/// tissue close on nothing. From the smaller share on the force is watched every period.
 const MAX_SPREAD: f64 = 0.8;
+const MORE_SPREAD: f64 = 0.6;
 pub(super) const WATCHED_SPREAD: f64 = 0.2;
 
 /// Jaws that stop above this share of their opening have not closed. They back off at most this
@@ -53,7 +55,7 @@ impl Scripted {
         }
         let next = match self.phase {
             Phase::Approach => Phase::Enter,
-            Phase::Enter if self.spread(episode) >= MAX_SPREAD => Phase::BackOut,
+            Phase::Enter if self.spread(episode) >= self.max_spread() => Phase::BackOut,
             Phase::Enter | Phase::BackOut | Phase::BackOff => Phase::Close,
             Phase::Close if self.backs < MAX_BACKS && self.does_not_close(episode) => {
                 self.backs += 1;
@@ -115,8 +117,8 @@ impl Scripted {
     /// it as the jaws can close on, or have backed out so far.
     pub(super) fn early(&self, episode: &Episode) -> bool {
         let over = match self.phase {
-            Phase::Approach | Phase::Enter => self.spread(episode) >= MAX_SPREAD,
-            Phase::BackOut => self.spread(episode) < MAX_SPREAD,
+            Phase::Approach | Phase::Enter => self.spread(episode) >= self.max_spread(),
+            Phase::BackOut => self.spread(episode) < self.max_spread(),
             _ => self.feels() && seen(episode).task.grasped > 0.0,
         };
         self.done > 0 && over
@@ -131,6 +133,11 @@ impl Scripted {
         let Some(k) = episode.roles().0 else { return 0.0 };
         let jaws = episode.scene().tools().get(k).map_or(f64::INFINITY, |tool| tool.instrument.jaw_force_n);
         episode.cell().observe()[k].jaw_force / jaws
+    }
+
+    /// The share of the jaws' force at which open blades stop in this try.
+    fn max_spread(&self) -> f64 {
+        MAX_SPREAD + MORE_SPREAD * self.tries as f64
     }
 
     /// Whether open blades are on their way to the grasp.
