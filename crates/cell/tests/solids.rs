@@ -261,43 +261,49 @@ fn jaws_open_until_pinned_tissue_holds_them() {
 
 #[test]
 fn a_start_in_an_organ_is_drawn_back_along_the_shaft() {
-    for pins in [Pins::Band { share: 1.0 }, ONE_END] {
+    let fixed = Pins::Band { share: 1.0 };
+    for (pins, free, lean) in [(fixed, false, 0.0), (ONE_END, false, 0.0), (ONE_END, true, 0.0), (fixed, true, 1.2)] {
         let specimen = meshed(pins, 2.2e-3);
-        for free in [false, true] {
-            let mut scene = scene();
-            scene.task.organ = "tube".to_owned();
-            if free {
-                scene.arms = vec![Arm::free(Side::Left, "grasper", [0.0, 0.46, 0.12])];
-                scene.instruments.truncate(1);
-            }
-            let outside = Cell::new(&scene, &specimen, 1).unwrap();
-            // The closed blades' tips 5 mm below the top of the tube.
-            let tip = outside.measured_cp("left").unwrap();
-            let inside = DVec3::new(0.0, 0.46, TUBE_TOP + 0.016);
-            let inside =
-                outside.solve("left", &Pose { translation: inside, ..tip }, &outside.setpoint("left").unwrap());
-            let start = inside.unwrap().setpoint.with_jaw(0.0);
-            let mut starts: Vec<Setpoint> = outside.observe().iter().map(|a| a.commanded).collect();
-            starts[0] = start;
-            let mut cell = Cell::new(&scene, &specimen, 1).unwrap();
-            cell.restart(&outside.save(), &starts).unwrap();
-            let now = cell.observe()[0].commanded;
-            let back = match free {
-                true => now.0[2] - start.0[2],
-                false => start.0[2] - now.0[2],
-            };
-            assert!(back > 0.003 && back < 0.012, "by {back} m");
-            let reports = rest(&mut cell, 10);
-            assert!(reports.iter().all(|r| r.rules.pierced == 0) && !cell.axes_inside()[0]);
-            assert!(most(&reports, |r| r.arms[0].solid_peak) == 0.0, "the organ does not push it");
-            // The next restart knows nothing of this one, and a start outside stays.
-            let mut again = Cell::new(&scene, &specimen, 1).unwrap();
-            again.restart(&outside.save(), &starts).unwrap();
-            cell.restart(&outside.save(), &starts).unwrap();
-            assert_eq!(cell.hash(), again.hash());
-            cell.restart(&outside.save(), &[now, starts[starts.len() - 1]][..starts.len()]).unwrap();
-            assert_eq!(cell.observe()[0].commanded, now);
+        let mut scene = scene();
+        scene.task.organ = "tube".to_owned();
+        // The blades are thick.
+        scene.tissue.tip_rest_offset_mm = 3.5;
+        if free {
+            let mut arm = Arm::free(Side::Left, "grasper", [0.0, 0.46 + 0.1 * lean, 0.12]);
+            arm.direction = Some([0.0, -libm::sin(lean), -libm::cos(lean)]);
+            scene.arms = vec![arm];
+            scene.instruments.truncate(1);
         }
+        let outside = Cell::new(&scene, &specimen, 1).unwrap();
+        // The closed blades' tips below the middle of the tube.
+        let tip = outside.measured_cp("left").unwrap();
+        let along = tip.rotation * DVec3::X;
+        let translation = DVec3::new(0.0, 0.46, TUBE_TOP - 1.6 * RADIUS) - 0.021 * along;
+        let near = outside.setpoint("left").unwrap();
+        let inside = outside.solve("left", &Pose { translation, ..tip }, &near).unwrap().setpoint.with_jaw(0.0);
+        let mut starts: Vec<Setpoint> = outside.observe().iter().map(|a| a.commanded).collect();
+        starts[0] = inside;
+        let mut cell = Cell::new(&scene, &specimen, 1).unwrap();
+        cell.restart(&outside.save(), &starts).unwrap();
+        let now = &cell.observe()[0];
+        let space = cell.workspace("left").unwrap();
+        let way = now.tip.translation - space.tip(&inside).translation;
+        println!("drawn back by {:.1} mm", 1e3 * way.length());
+        assert!(way.length() > 0.004 && way.length() < 0.03, "by {way} m");
+        assert!(way.normalize().distance(-(space.tip(&inside).rotation * DVec3::X)) < 0.02, "along the shaft");
+        let start = now.commanded;
+        let reports = rest(&mut cell, 10);
+        assert!(reports.iter().all(|r| r.rules.pierced == 0) && !cell.axes_inside()[0]);
+        let (solid, soft) = (most(&reports, |r| r.arms[0].solid_peak), most(&reports, |r| r.arms[0].contact.length()));
+        assert!(solid == 0.0 && soft < 0.05, "the organ pushes it with {solid} and {soft} N");
+        // The next restart knows nothing of this one, and a start outside stays.
+        let mut again = Cell::new(&scene, &specimen, 1).unwrap();
+        again.restart(&outside.save(), &starts).unwrap();
+        cell.restart(&outside.save(), &starts).unwrap();
+        assert_eq!(cell.hash(), again.hash());
+        starts[0] = start;
+        cell.restart(&outside.save(), &starts).unwrap();
+        assert_eq!(cell.observe()[0].commanded, start);
     }
 }
 
@@ -310,5 +316,7 @@ fn a_scene_whose_start_is_in_an_organ_begins_out_of_it() {
     scene.arms = vec![Arm::free(Side::Left, "grasper", [0.0, 0.46, TUBE_TOP + 0.016])];
     scene.arms[0].start.jaw = 0.0;
     let cell = Cell::new(&scene, &specimen, 1).unwrap();
-    assert!(!cell.axes_inside()[0] && cell.observe()[0].commanded.0[2] > TUBE_TOP + 0.02);
+    let arm = &cell.observe()[0];
+    assert!(!cell.axes_inside()[0] && arm.commanded.0[2] > TUBE_TOP + 0.02);
+    assert_eq!((arm.measured, arm.tip.translation.z), (arm.commanded, arm.commanded.0[2]));
 }

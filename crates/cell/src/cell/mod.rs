@@ -166,15 +166,17 @@ impl Cell {
         }
         let schedule = build::schedule(scene.tissue.schedule);
         let world = World::surrounded(&specimen, &surroundings, colliders, schedule, threads)?;
-        let pinned = PinnedSurface::felt(&world, contact);
+        let solids = Solids { bed, pinned: PinnedSurface::felt(&world, contact), holes: Vec::new() };
         for arm in &mut arms {
-            let start = arm.state.commanded;
-            arm.begin(&start, &world)?;
+            if !arm.is_out(&world, &solids) {
+                let start = arm.state.commanded;
+                arm.begin(&start, &world, &solids)?;
+            }
         }
         Ok(Self {
             motions: Vec::with_capacity(3 * arms.len()),
             edges: Edges::of(&world),
-            solids: Solids { bed, pinned, holes: Vec::new() },
+            solids,
             contact,
             watches: vec![OrganWatch::default(); world.model.bodies().len()],
             touch: false,

@@ -15,8 +15,8 @@ impl Cell {
 
     /// Restores the tissue of `state` without grasps and holes, puts the arms at rest at `starts`
     /// (one for each arm), and sets the time to zero. A start in an organ is drawn back along the
-    /// shaft until the instrument's axes are out of it. The same state and starts give the same
-    /// bits, whatever the cell did before.
+    /// shaft until the instrument is out of it, as far as the workspace allows. The same state and
+    /// starts give the same bits, whatever the cell did before.
     ///
     /// # Errors
     /// A state of another cell, or a start out of an arm's reach. The cell then has to be restored
@@ -28,10 +28,12 @@ impl Cell {
         }
         self.restore(state)?;
         self.world.state.holes.clear();
+        self.solids.holes.clear();
+        self.solids.pinned.follow(&self.world);
         for (arm, start) in self.arms.iter_mut().zip(starts) {
             let tool = arm.model.tools.gripper;
             self.world.state.grasps.retain(|g| g.tool != tool);
-            arm.begin(start, &self.world)?;
+            arm.begin(start, &self.world, &self.solids)?;
         }
         self.waiting.0.clear();
         self.periods = 0;

@@ -17,9 +17,9 @@ const MAX_INT16: f32 = 32767.0;
 /// Numbers that are all smaller than this count as 0.
 const MIN_GREATEST: f32 = 1e-30;
 
-/// 1.5 * 2^23: a number up to 2^22 plus this is whole, the nearest (the even one of two), and the
-/// sum's last bits are those of the whole number. It is quicker than to round and to convert, and
-/// SSE2 has no instruction that rounds.
+/// 1.5 * 2^23. Added to a number of at most 2^22 in size, it rounds it to the nearest whole number,
+/// to the even one of two. The low 16 bits of the sum are those of that number. SSE2 has no
+/// instruction that rounds.
 const WHOLE: f32 = 12_582_912.0;
 
 /// Column k is paired with column k + 8.

@@ -79,7 +79,7 @@ impl Solids {
     }
 
     /// The meetings of `arm`, whose rods are given, with all but other instruments.
-    pub(super) fn still(&self, arm: &ArmUnit, rods: &[Rod]) -> Vec<Meeting> {
+    pub(in crate::cell) fn still(&self, arm: &ArmUnit, rods: &[Rod]) -> Vec<Meeting> {
         let mut found = Vec::new();
         if let Some(height) = self.bed.filter(|_| arm.model.workspace.as_port().is_some()) {
             let mut deepest = Deepest::default();

@@ -22,6 +22,7 @@ use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
+use trocar_specimen::Specimen;
 use trocar_tissue::{BodyContact, Model, SolverSettings, State};
 use trocar_tissue_reference::{Oracle, OracleState, stable_explicit_step};
 use trocar_workflow::{check_interrupted, phantoms};
@@ -122,7 +123,12 @@ impl Study for IntegratorsExperiment {
             undamped: self.undamped,
             threads: if self.threads == 0 { rayon::current_num_threads() } else { self.threads },
         };
-        let document = document(&result)?;
+        let damping = match (&organs, self.undamped) {
+            (None, _) => "damped as in the cell",
+            (Some(_), false) => "lightly damped",
+            (Some(_), true) => "undamped",
+        };
+        let document = document(&result, damping)?;
         Ok((result, document))
     }
 }
@@ -135,8 +141,7 @@ impl IntegratorsExperiment {
         Ok(BenchScene::sag(organs, trocar_tissue::Material { viscosity, ..tissue })?.model)
     }
 
-    /// Phantom A with the materials and supports of the cell, without friction: where tissue that
-    /// rubs comes to rest depends on the way there, and there is more than one equilibrium.
+    /// Phantom A with the materials and supports of the cell.
     fn phantom(&self, job: &Job<'_>) -> Result<Model> {
         if self.undamped {
             return Err(Error::Mismatch("--undamped needs --mesh: the organs of the cell are damped".to_owned()));
@@ -149,13 +154,19 @@ impl IntegratorsExperiment {
             phantoms::AfterUse::Keep,
             job.progress,
         )?;
-        let surroundings = Surroundings {
-            body_contact: Some(BodyContact { friction: 0.0, ..BodyContact::default() }),
-            bed_friction: Some(0.0),
-            ..Surroundings::default()
-        };
-        Ok(World::surrounded(&specimen, &surroundings, Vec::new(), SolverSettings::default(), 1)?.model)
+        frictionless(&specimen)
     }
+}
+
+/// The organs of a specimen on their bed, without friction: where tissue that rubs comes to rest
+/// depends on the way there, and there is more than one equilibrium.
+fn frictionless(specimen: &Specimen) -> Result<Model> {
+    let surroundings = Surroundings {
+        body_contact: Some(BodyContact { friction: 0.0, ..BodyContact::default() }),
+        bed_friction: Some(0.0),
+        ..Surroundings::default()
+    };
+    Ok(World::surrounded(specimen, &surroundings, Vec::new(), SolverSettings::default(), 1)?.model)
 }
 
 /// The static equilibrium of the organs.
@@ -229,8 +240,7 @@ fn measured(
     })
 }
 
-fn document(result: &IntegratorsResult) -> Result<Document> {
-    let damping = if result.undamped { "undamped" } else { "damped as in the cell" };
+fn document(result: &IntegratorsResult, damping: &str) -> Result<Document> {
     let lead = format!(
         "{} ({} elements, {} nodes), released at rest in its rest shape under gravity, {damping}. The plot shows the \
          largest node speed at the end of each frame of 1/60 s. The \
@@ -318,4 +328,28 @@ fn rows(result: &IntegratorsResult) -> Section {
         result.threads
     );
     Section::new("All integrators", lead).table(table)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests may panic")]
+
+    use super::*;
+    use trocar_core::Silent;
+    use trocar_testing::tube::{ONE_END, two_tubes};
+
+    /// What comes to rest without friction is where the oracle says; with it, it is elsewhere.
+    #[test]
+    fn organs_without_friction_have_one_equilibrium() {
+        let specimen = two_tubes(ONE_END, 4e-3);
+        let error = |model: &Model| {
+            let truth = Equilibrium::of(model).unwrap();
+            let forms = forms(model, FRAME);
+            let fast = forms.into_iter().find(|form| form.name == "Quasi-Newton").unwrap();
+            measured(fast, model, &truth, 60, 1, &Silent).unwrap().sag_error.unwrap()
+        };
+        let rubs = World::new(&specimen, SolverSettings::default(), 1).unwrap().model;
+        let (without, with) = (error(&frictionless(&specimen).unwrap()), error(&rubs));
+        assert!(without < 0.02 && with > 5.0 * without, "without friction {without}, with friction {with}");
+    }
 }

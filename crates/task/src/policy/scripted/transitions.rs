@@ -9,11 +9,13 @@ use crate::judge::{Context, Memory};
 use trocar_scene::{Condition, TaskName};
 
 /// Open blades go no deeper where tissue presses them apart with this share of the jaws' force:
-/// they could not close. With every further try the share grows: blades that stop early at stiff
-/// tissue close on nothing. From the smaller share on the force is watched every period.
+/// they could not close. From the smaller share on the force is watched every period.
 const MAX_SPREAD: f64 = 0.8;
-const MORE_SPREAD: f64 = 0.6;
 pub(super) const WATCHED_SPREAD: f64 = 0.2;
+
+/// Every further try allows this much more. Stiff tissue presses hard on open blades before enough
+/// of it lies between them, and blades that stop there close on nothing.
+const MORE_SPREAD: f64 = 0.6;
 
 /// Jaws that stop above this share of their opening have not closed. They back off at most this
 /// often, whatever keeps them open.
