@@ -100,7 +100,7 @@ impl Study for IntegratorsExperiment {
         job.claim()?;
         let (specimen, model) = match &organs {
             Some(organs) => (organs.source.clone(), self.pinned(organs)?),
-            None => ("phantom A, reconstructed, without friction".to_owned(), self.phantom(job)?),
+            None => ("Phantom A, reconstructed, without friction".to_owned(), self.phantom(job)?),
         };
         let truth = Equilibrium::of(&model)?;
         let stable = stable_explicit_step(&model);
