@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use trocar_core::{Progress, Silent};
 use trocar_scene::{BackendName, Scene, Split, TissueSource, VariationSet};
-use trocar_workflow::{Error, Result, SpecimenCache, drawn_specimens, read_varied, refuse_overlap};
+use trocar_workflow::{Error, Result, SpecimenCache, drawn_specimens, read_varied, refuse_scene_overlap};
 
 /// Maximum number of parallel episodes per core. Each has its own cell in memory.
 const JOBS_PER_CORE: usize = 8;
@@ -126,7 +126,7 @@ impl Campaign {
             scene.tissue.cell_mm = self.cell_mm;
             scene.validate()?;
         }
-        refuse_overlap(Path::new(&self.scene), output)?;
+        refuse_scene_overlap(&self.scene, output)?;
         // Making a specimen takes minutes, so everything that does not need it is checked first.
         manifest::check(&self.policies, self.episodes, self.seed, max_episodes)?;
         let cores = std::thread::available_parallelism().map_or(1, usize::from);

@@ -2,7 +2,7 @@
 
 use crate::pages;
 use crate::phantoms::recorded_specimen;
-use crate::reconstruct::{REPORT, refuse_overlap};
+use crate::reconstruct::{REPORT, refuse_scene_overlap};
 use crate::recorder::Recorder;
 use crate::specimen_cache::{SpecimenCache, drawn_specimens};
 use crate::surfaces::{SURFACES_FILE, SurfaceWatch};
@@ -72,7 +72,7 @@ impl EpisodeRun {
     /// A scene that cannot be read; a folder with other contents.
     pub fn check(&self, output: &Path) -> Result<Scene> {
         let scene = read_varied(&self.scene, self.variation, VariationSet::None)?;
-        refuse_overlap(Path::new(&self.scene), output)?;
+        refuse_scene_overlap(&self.scene, output)?;
         // The staged folder is removed when it is dropped.
         StagedFolder::create(output, RESULT_FILE)?;
         Ok(scene)

@@ -36,7 +36,7 @@ pub use lift_result::LiftResult;
 pub use phantoms::scene_specimen;
 pub use reconstruct::{
     CompositeFigures, OrganRow, REPORT, Reconstructed, ReconstructedRecording, reconstruct_recording,
-    reconstruct_surface, refuse_overlap,
+    reconstruct_surface, refuse_scene_overlap,
 };
 pub use rendering::{Rendered, Rendering, ScriptedLift, VisibleObject};
 pub use segment::{Segment, Segmented, WeightFile, weight_files};

@@ -3,7 +3,7 @@
 
 use crate::lift_result::{FinishedLift, LiftResult};
 use crate::phantoms::scene_specimen;
-use crate::reconstruct::{REPORT, refuse_overlap};
+use crate::reconstruct::{REPORT, refuse_overlap, refuse_scene_overlap};
 use crate::recorder::Recorder;
 use crate::specimen_scene::{free_scene, grasp_lift, task_organ};
 use crate::{Error, Result, check_interrupted, pages};
@@ -99,7 +99,7 @@ impl Lift {
         progress: &dyn Progress,
     ) -> Result<LiftResult> {
         let mut read = Scene::read(scene)?;
-        refuse_overlap(Path::new(scene), output)?;
+        refuse_scene_overlap(scene, output)?;
         self.script.check()?;
         let staged = StagedFolder::create(output, RESULT_FILE)?;
         let specimen = scene_specimen(&read, phantoms, progress)?;

@@ -9,6 +9,7 @@ use trocar_geometry::io::Unit;
 use trocar_reconstruct::truth::{Truth, TruthFigures};
 use trocar_reconstruct::{Reconstruction, Settings};
 use trocar_recording::Recording;
+use trocar_scene::Builtin;
 use trocar_specimen::{OrganFacts, Specimen, StagedFolder};
 
 /// The report's name in every folder.
@@ -160,7 +161,7 @@ fn finish(staged: StagedFolder, specimen: &Specimen, html: &str, progress: &dyn 
 }
 
 /// Refuses an output that is, contains or is inside the input, which would be replaced or changed.
-pub fn refuse_overlap(input: &Path, output: &Path) -> Result<()> {
+pub(crate) fn refuse_overlap(input: &Path, output: &Path) -> Result<()> {
     // A missing output is placed by its nearest existing parent.
     let placed = |path: &Path| {
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
@@ -172,6 +173,11 @@ pub fn refuse_overlap(input: &Path, output: &Path) -> Result<()> {
         return Err(Error::Overlap { input: input.to_owned(), output: output.to_owned() });
     }
     Ok(())
+}
+
+/// The same for a scene file; a built-in scene, which wins over a file of its name, is no input.
+pub fn refuse_scene_overlap(scene: &str, output: &Path) -> Result<()> {
+    if Builtin::named(scene).is_some() { Ok(()) } else { refuse_overlap(Path::new(scene), output) }
 }
 
 fn figures(
@@ -193,5 +199,18 @@ fn figures(
         notes,
         seconds: clock.elapsed().as_secs_f64(),
         report: output.join(REPORT).display().to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_built_in_scene_is_not_a_folder_of_its_name() {
+        let here = Path::new("cell-a");
+        assert!(refuse_scene_overlap("cell-a", here).is_ok());
+        assert!(refuse_scene_overlap("cell-a.toml", Path::new("cell-a.toml")).is_err());
+        assert!(refuse_overlap(here, here).is_err());
     }
 }
