@@ -93,7 +93,7 @@ impl Newton {
             return Err(Error::Invalid(format!("the precision is {given} of the weight; must be in [1e-14, 1]")));
         }
         let matrix = Potential::pattern(body);
-        let preconditioner = Preconditioner::new(&matrix, body.lattice().nodes());
+        let preconditioner = Preconditioner::new(&matrix);
         Ok(Self { precision, matrix, preconditioner, factorised: false })
     }
 

@@ -21,9 +21,9 @@ pub(crate) struct Preconditioner {
 }
 
 impl Preconditioner {
-    /// Analyses the pattern of `matrix`, whose nodes rest at `rest` (m).
-    pub fn new(matrix: &BlockMatrix, rest: &[DVec3]) -> Self {
-        Self { cholesky: Cholesky::new(matrix, rest), numbers: vec![0.0; 3 * rest.len()] }
+    /// Analyses the pattern of `matrix`.
+    pub fn new(matrix: &BlockMatrix) -> Self {
+        Self { cholesky: Cholesky::new(matrix), numbers: vec![0.0; 3 * matrix.len()] }
     }
 
     /// Factorises; false if the matrix is not positive definite.

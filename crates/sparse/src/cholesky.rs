@@ -2,11 +2,11 @@
 //! "The multifrontal solution of indefinite sparse symmetric linear equations", 1983).
 
 use crate::dense::{COLUMNS, eliminate, first_of_band, inverse_bands};
-use crate::dissection::{Graph, dissect};
+use crate::dissection::dissect;
+use crate::graph::{Graph, NONE};
 use crate::supernodes::{Supernode, elimination_tree, postorder, supernodes};
 use crate::{BlockMatrix, Real};
 use fearless_simd::Level;
-use glam::DVec3;
 use rayon::prelude::*;
 use trocar_core::has_threads;
 
@@ -16,7 +16,7 @@ const SHARED: u64 = 1 << 20;
 /// The factor L of a matrix A = P' L L' P, and its memory. P is a nested dissection.
 ///
 /// ```
-/// use glam::{DMat3, DVec3};
+/// use glam::DMat3;
 /// use trocar_sparse::{BlockMatrix, Cholesky, Level};
 ///
 /// // Two nodes, joined and held by springs of 1 N/m.
@@ -24,7 +24,7 @@ const SHARED: u64 = 1 << 20;
 /// matrix.add(0, 0, DMat3::IDENTITY * 2.0);
 /// matrix.add(1, 1, DMat3::IDENTITY * 2.0);
 /// matrix.add(1, 0, -DMat3::IDENTITY);
-/// let mut factor = Cholesky::<f64>::new(&matrix, &[DVec3::ZERO, DVec3::X]);
+/// let mut factor = Cholesky::<f64>::new(&matrix);
 /// assert!(factor.factorise(Level::new(), matrix.blocks().map(|(_, _, block)| block.to_cols_array_2d())));
 /// let mut x = [3.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 /// factor.solve(Level::new(), &mut x);
@@ -56,20 +56,17 @@ struct Place {
 }
 
 impl<T: Real> Cholesky<T> {
-    /// Analyses the pattern of `matrix`, whose nodes lie at `positions`. Numbers follow with
-    /// [`Self::factorise`].
-    pub fn new(matrix: &BlockMatrix, positions: &[DVec3]) -> Self {
+    /// Analyses the pattern of `matrix`. Numbers follow with [`Self::factorise`].
+    pub fn new(matrix: &BlockMatrix) -> Self {
         let graph = Graph::new(matrix);
-        let dissected = dissect(&graph, positions);
+        let dissected = dissect(&graph);
         let parent = elimination_tree(&graph, &dissected, &inverse(&dissected));
         let along_tree = postorder(&parent);
         let order: Vec<u32> = along_tree.iter().map(|i| dissected[*i as usize]).collect();
         let (rank, new_rank) = (inverse(&order), inverse(&along_tree));
-        let parent: Vec<u32> = along_tree
-            .iter()
-            .map(|i| new_rank.get(parent[*i as usize] as usize).copied().unwrap_or(crate::supernodes::NONE))
-            .collect();
-        let neighbours = |i: u32| graph.neighbours(order[i as usize]).iter().map(|j| rank[*j as usize]);
+        let parent: Vec<u32> =
+            along_tree.iter().map(|i| new_rank.get(parent[*i as usize] as usize).copied().unwrap_or(NONE)).collect();
+        let neighbours = |i: u32| graph.neighbours(order[i as usize]).map(|j| rank[j as usize]);
         let supernodes = supernodes(&parent, neighbours);
         let (mut first, mut work) = (vec![0], Vec::with_capacity(supernodes.len()));
         for s in &supernodes {

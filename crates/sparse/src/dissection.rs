@@ -1,214 +1,210 @@
 //! Nested dissection: an order of elimination that keeps the Cholesky factor sparse.
 //!
 //! George, "Nested dissection of a regular finite element mesh", 1973. A part is cut into two
-//! halves along the coordinate axis, or along the distance over the mesh from one of its ends, that
-//! gives the smallest separator. The separator is a minimum vertex cover of the cut edges (Koenig's
-//! theorem), and is eliminated after the halves.
+//! halves by a separator, which is eliminated after them. To find a small separator, the part is
+//! made coarser until few nodes are left and cut there. On each finer graph the separator is made
+//! smaller (Hendrickson and Rothberg, "Improving the run time and quality of nested dissection
+//! ordering", 1998).
 
-use crate::BlockMatrix;
-use glam::DVec3;
-use std::collections::VecDeque;
+use crate::coarsening::Coarser;
+use crate::graph::Graph;
+use crate::separator::{SEPARATOR, Separator};
+use trocar_core::has_threads;
 
 /// Parts of at most this many nodes are not cut further.
-const MAX_LEAF_NODES: usize = 14;
+const MAX_LEAF_NODES: usize = 16;
 
-/// A mesh graph: the neighbours of node i are `to[first[i]..first[i + 1]]`.
-pub(crate) struct Graph {
-    first: Vec<u32>,
-    to: Vec<u32>,
-}
+/// Graphs of at most this many nodes are not made coarser.
+const COARSEST: usize = 80;
 
-impl Graph {
-    /// The graph of a matrix's blocks.
-    pub fn new(matrix: &BlockMatrix) -> Self {
-        let mut lists = vec![Vec::new(); matrix.len()];
-        for (i, j, _) in matrix.blocks().filter(|(i, j, _)| i != j) {
-            lists[i as usize].push(j);
-            lists[j as usize].push(i);
-        }
-        let mut first = vec![0];
-        first.extend(lists.iter().scan(0, |sum, list| {
-            *sum += list.len() as u32;
-            Some(*sum)
-        }));
-        Self { first, to: lists.concat() }
+/// A coarser graph with more than this share of the nodes is of no use.
+const MAX_COARSER: f64 = 0.9;
+
+/// Cuts of a part that is made coarser, each from another coarser graph; the best counts.
+const CUTS: u32 = 3;
+
+/// Nodes of the coarsest graph that a half grows from; the best cut counts.
+const SEEDS: usize = 3;
+
+/// Parts of at least this many nodes are worth a thread of their own.
+const MIN_NODES: usize = 200;
+
+/// The nodes of `graph` in the order of elimination: first eliminated first.
+pub(crate) fn dissect(graph: &Graph) -> Vec<u32> {
+    let nodes = graph.nodes().collect();
+    if graph.len() <= MAX_LEAF_NODES {
+        return nodes;
     }
-
-    pub fn neighbours(&self, i: u32) -> &[u32] {
-        &self.to[self.first[i as usize] as usize..self.first[i as usize + 1] as usize]
+    let sides = best_cut(graph);
+    let on = |side: u8| graph.nodes().filter(|i| sides[*i as usize] == side).collect::<Vec<u32>>();
+    let (separator, halves) = (on(SEPARATOR), [on(1), on(2)]);
+    if halves.iter().any(Vec::is_empty) {
+        return nodes;
     }
-
-    pub fn len(&self) -> usize {
-        self.first.len() - 1
-    }
-}
-
-/// The nodes of `graph`, which lie at `positions`, in the order of elimination: first eliminated
-/// first.
-pub(crate) fn dissect(graph: &Graph, positions: &[DVec3]) -> Vec<u32> {
-    let n = graph.len();
-    let mut work = Work {
-        graph,
-        positions,
-        part: vec![0; n],
-        parts: 0,
-        side: vec![0; n],
-        mate: vec![NONE; n],
-        seen: vec![0; n],
-        visits: 0,
+    let order = |half: &[u32]| dissect(&graph.part(half)).into_iter().map(|k| half[k as usize]).collect::<Vec<u32>>();
+    let [a, b] = &halves;
+    let (a, b) = match has_threads() && graph.len() >= MIN_NODES {
+        true => rayon::join(|| order(a), || order(b)),
+        false => (order(a), order(b)),
     };
-    let mut order = Vec::with_capacity(n);
-    work.cut((0..n as u32).collect(), &mut order);
-    order
+    [a, b, separator].concat()
 }
 
-const NONE: u32 = u32::MAX;
-
-struct Work<'a> {
-    graph: &'a Graph,
-    positions: &'a [DVec3],
-    /// The part that each node is in at the moment.
-    part: Vec<u32>,
-    parts: u32,
-    /// Half of the cut: 1 or 2.
-    side: Vec<u8>,
-    /// Partner in the matching of the edges cut.
-    mate: Vec<u32>,
-    seen: Vec<u32>,
-    visits: u32,
+/// The cut with the smallest separator; the side of each node.
+fn best_cut(graph: &Graph) -> Vec<u8> {
+    let cuts = (0..if graph.len() > COARSEST { CUTS } else { 1 }).map(|turn| cut(graph, turn));
+    cuts.min_by_key(|sides| graph.weight_of(sides, SEPARATOR)).unwrap_or_default()
 }
 
-impl Work<'_> {
-    /// Appends the nodes of a part to `order`.
-    fn cut(&mut self, nodes: Vec<u32>, order: &mut Vec<u32>) {
-        if nodes.len() <= MAX_LEAF_NODES {
-            order.extend(nodes);
+/// Cuts a graph; another `turn` makes it coarser in another way.
+fn cut(graph: &Graph, turn: u32) -> Vec<u8> {
+    if graph.len() <= COARSEST {
+        return first_cut(graph);
+    }
+    let coarser = Coarser::new(graph, graph.weight().div_ceil(COARSEST as u32 / 2), turn);
+    if coarser.graph.len() as f64 > MAX_COARSER * graph.len() as f64 {
+        return first_cut(graph);
+    }
+    let coarse = cut(&coarser.graph, turn);
+    let mut sides: Vec<u8> = coarser.of.iter().map(|k| coarse[*k as usize]).collect();
+    Separator::new(graph, &mut sides).refine();
+    sides
+}
+
+/// The best of some cuts in which a half grows from a node.
+fn first_cut(graph: &Graph) -> Vec<u8> {
+    let seeds = (0..SEEDS).map(|k| (k * graph.len() / SEEDS) as u32);
+    let cuts = seeds.map(|seed| {
+        let mut sides = grow(graph, seed);
+        Separator::new(graph, &mut sides).refine();
+        sides
+    });
+    cuts.min_by_key(|sides| graph.weight_of(sides, SEPARATOR)).unwrap_or_default()
+}
+
+/// A half that grows from a node until it has half of the weight; what is next to it separates.
+fn grow(graph: &Graph, seed: u32) -> Vec<u8> {
+    let distances = graph.distances(seed);
+    let mut near: Vec<u32> = graph.nodes().collect();
+    near.sort_by_key(|i| distances[*i as usize]);
+    let mut sides = vec![2; graph.len()];
+    let mut weight = 0;
+    for i in near {
+        if 2 * weight >= graph.weight() {
+            break;
+        }
+        sides[i as usize] = 1;
+        weight += graph.weights[i as usize];
+    }
+    for i in graph.nodes() {
+        if sides[i as usize] == 2 && graph.neighbours(i).any(|j| sides[j as usize] == 1) {
+            sides[i as usize] = SEPARATOR;
+        }
+    }
+    sides
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::BlockMatrix;
+    use crate::supernodes::{column_counts, elimination_tree};
+
+    /// A grid of `n` nodes a side, each joined to the next along the axes.
+    fn grid(n: [u32; 3]) -> Graph {
+        let mut pairs = Vec::new();
+        for i in nodes(n, [0; 3], n) {
+            let at = [i % n[0], i / n[0] % n[1], i / n[0] / n[1]];
+            let steps = [1, n[0], n[0] * n[1]];
+            pairs.extend((0..3).filter(|c| at[*c] + 1 < n[*c]).map(|c| (i, i + steps[c])));
+        }
+        Graph::new(&BlockMatrix::new(n.iter().product::<u32>() as usize, pairs.into_iter()))
+    }
+
+    /// Sizes of the separator and of the halves; none of the edges goes from half to half.
+    fn sizes(graph: &Graph) -> [u32; 3] {
+        let sides = best_cut(graph);
+        for i in graph.nodes() {
+            let across =
+                |j: u32| sides[i as usize] + sides[j as usize] == 3 && sides[i as usize] * sides[j as usize] == 2;
+            assert!(!graph.neighbours(i).any(across), "an edge of node {i} joins the halves");
+        }
+        [SEPARATOR, 1, 2].map(|side| graph.weight_of(&sides, side))
+    }
+
+    #[test]
+    fn a_box_is_cut_across_its_longest_side() {
+        for n in [[40, 6, 5], [6, 40, 5], [12, 12, 30], [60, 3, 3]] {
+            let [separator, a, b] = sizes(&grid(n));
+            let mut sides = n;
+            sides.sort_unstable();
+            let smallest = sides[0] * sides[1];
+            assert!(separator <= smallest, "{n:?}: {separator} nodes, {smallest} would do");
+            assert!(2 * a.min(b) >= a.max(b), "{n:?}: halves of {a} and {b} nodes");
+        }
+    }
+
+    /// Numbers of nodes in the factor of a graph that is eliminated in this order.
+    fn fill(graph: &Graph, order: &[u32]) -> u32 {
+        let mut rank = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(k, i)| rank[*i as usize] = k as u32);
+        let parent = elimination_tree(graph, order, &rank);
+        let neighbours = |k: u32| graph.neighbours(order[k as usize]).map(|j| rank[j as usize]);
+        column_counts(&parent, &neighbours).iter().sum()
+    }
+
+    /// The nodes of a box of a grid.
+    fn nodes(n: [u32; 3], from: [u32; 3], to: [u32; 3]) -> impl Iterator<Item = u32> {
+        let lines = (from[2]..to[2]).flat_map(move |z| (from[1]..to[1]).map(move |y| n[0] * (y + n[1] * z)));
+        lines.flat_map(move |line| (from[0]..to[0]).map(move |x| x + line))
+    }
+
+    /// George's order of a grid: planes across the longest side of a box, again and again.
+    fn by_planes(n: [u32; 3], from: [u32; 3], to: [u32; 3], order: &mut Vec<u32>) {
+        let longest = (0..3).max_by_key(|c| to[*c] - from[*c]).unwrap();
+        if to[longest] - from[longest] < 3 {
+            order.extend(nodes(n, from, to));
             return;
         }
-        self.parts += 1;
-        for i in &nodes {
-            self.part[*i as usize] = self.parts;
-        }
-        let mut best: Option<(Vec<u32>, Vec<u32>, Vec<u32>)> = None;
-        for keys in self.coordinates(&nodes) {
-            let (a, b, separator) = self.halves(&nodes, &keys);
-            if best.as_ref().is_none_or(|(_, _, s)| separator.len() < s.len()) {
-                best = Some((a, b, separator));
-            }
-        }
-        let Some((a, b, separator)) = best else { return };
-        if a.is_empty() || b.is_empty() {
-            order.extend(a.into_iter().chain(b).chain(separator));
-            return;
-        }
-        self.cut(a, order);
-        self.cut(b, order);
-        order.extend(separator);
-    }
-
-    /// Coordinates along which the part may be cut.
-    fn coordinates(&mut self, nodes: &[u32]) -> Vec<Vec<f64>> {
-        let mut all: Vec<Vec<f64>> =
-            (0..3).map(|axis| nodes.iter().map(|i| self.positions[*i as usize][axis]).collect()).collect();
-        let start = self.farthest(nodes, nodes[0]).0;
-        let (_, distance) = self.farthest(nodes, start);
-        all.push(distance);
-        all
-    }
-
-    /// The node of the part farthest from `from` in edges, and all distances; unreachable nodes are
-    /// farther than all others.
-    fn farthest(&mut self, nodes: &[u32], from: u32) -> (u32, Vec<f64>) {
-        self.visits += 1;
-        let mut level = std::collections::BTreeMap::new();
-        let mut queue = VecDeque::from([(from, 0.0)]);
-        self.seen[from as usize] = self.visits;
-        let mut last = from;
-        while let Some((i, d)) = queue.pop_front() {
-            level.insert(i, d);
-            last = i;
-            for j in self.graph.neighbours(i) {
-                let inside = self.part[*j as usize] == self.part[from as usize];
-                if inside && self.seen[*j as usize] != self.visits {
-                    self.seen[*j as usize] = self.visits;
-                    queue.push_back((*j, d + 1.0));
-                }
-            }
-        }
-        let beyond = nodes.len() as f64;
-        (last, nodes.iter().map(|i| level.get(i).copied().unwrap_or(beyond)).collect())
-    }
-
-    /// Halves of the part by `keys`, and their separator.
-    fn halves(&mut self, nodes: &[u32], keys: &[f64]) -> (Vec<u32>, Vec<u32>, Vec<u32>) {
-        let mut by_key: Vec<usize> = (0..nodes.len()).collect();
-        by_key.sort_by(|a, b| keys[*a].total_cmp(&keys[*b]).then(nodes[*a].cmp(&nodes[*b])));
-        let part = self.part[nodes[0] as usize];
-        for (rank, k) in by_key.iter().enumerate() {
-            self.side[nodes[*k] as usize] = if 2 * rank < nodes.len() { 1 } else { 2 };
-            self.mate[nodes[*k] as usize] = NONE;
-        }
-        let across = |work: &Self, i: u32, j: u32| {
-            work.part[j as usize] == part && work.side[j as usize] != work.side[i as usize]
+        let middle = (from[longest] + to[longest]) / 2;
+        let with = |mut corner: [u32; 3], at: u32| {
+            corner[longest] = at;
+            corner
         };
-        let left: Vec<u32> = nodes
-            .iter()
-            .copied()
-            .filter(|i| self.side[*i as usize] == 1 && self.graph.neighbours(*i).iter().any(|j| across(self, *i, *j)))
-            .collect();
-        for i in &left {
-            self.visits += 1;
-            self.augment(*i, part);
-        }
-        // Koenig: nodes that alternating paths from unmatched left nodes reach. The cover is the
-        // left nodes not reached and the right ones reached.
-        self.visits += 1;
-        let mut stack: Vec<u32> = left.iter().copied().filter(|i| self.mate[*i as usize] == NONE).collect();
-        stack.iter().for_each(|i| self.seen[*i as usize] = self.visits);
-        while let Some(i) = stack.pop() {
-            for j in self.graph.neighbours(i) {
-                if across(self, i, *j) && self.seen[*j as usize] != self.visits {
-                    self.seen[*j as usize] = self.visits;
-                    let next = self.mate[*j as usize];
-                    if next != NONE && self.seen[next as usize] != self.visits {
-                        self.seen[next as usize] = self.visits;
-                        stack.push(next);
-                    }
-                }
-            }
-        }
-        let mut halves = (Vec::new(), Vec::new(), Vec::new());
-        for i in nodes {
-            let k = *i as usize;
-            let reached = self.seen[k] == self.visits;
-            // Only matched nodes can be in the cover.
-            let covers = self.mate[k] != NONE && (reached == (self.side[k] == 2));
-            if covers {
-                halves.2.push(*i);
-            } else if self.side[k] == 1 {
-                halves.0.push(*i);
-            } else {
-                halves.1.push(*i);
-            }
-        }
-        halves
+        by_planes(n, from, with(to, middle), order);
+        by_planes(n, with(from, middle + 1), to, order);
+        order.extend(nodes(n, with(from, middle), with(to, middle + 1)));
     }
 
-    /// Finds a partner for left node `i` along an augmenting path.
-    fn augment(&mut self, i: u32, part: u32) -> bool {
-        let graph = self.graph;
-        for j in graph.neighbours(i) {
-            let k = *j as usize;
-            if self.part[k] != part || self.side[k] != 2 || self.seen[k] == self.visits {
-                continue;
-            }
-            self.seen[k] = self.visits;
-            if self.mate[k] == NONE || self.augment(self.mate[k], part) {
-                self.mate[k] = i;
-                self.mate[i as usize] = *j;
-                return true;
-            }
+    #[test]
+    fn grids_fill_in_less_than_by_planes() {
+        for n in [[15, 15, 15], [31, 15, 7], [40, 6, 5]] {
+            let graph = grid(n);
+            let mut planes = Vec::new();
+            by_planes(n, [0; 3], n, &mut planes);
+            let [ours, planes] = [dissect(&graph), planes].map(|order| fill(&graph, &order));
+            assert!(ours < planes, "{n:?}: {ours} numbers, {planes} by planes");
         }
-        false
+    }
+
+    #[test]
+    fn any_graph_has_an_order() {
+        let star: Vec<(u32, u32)> = (1..200).map(|i| (0, i)).collect();
+        let complete: Vec<(u32, u32)> = (0..90).flat_map(|i| (0..i).map(move |j| (i, j))).collect();
+        let path: Vec<(u32, u32)> = (1..300).map(|i| (i - 1, i)).collect();
+        for (nodes, pairs) in
+            [(200, star), (90, complete), (300, path), (100, Vec::new()), (1, Vec::new()), (0, Vec::new())]
+        {
+            let mut order = dissect(&Graph::new(&BlockMatrix::new(nodes, pairs.into_iter())));
+            order.sort_unstable();
+            assert_eq!(order, (0..nodes as u32).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn two_pieces_are_cut_between_them() {
+        let piece = |first: u32| (1..100).map(move |i| (first + i - 1, first + i));
+        let graph = Graph::new(&BlockMatrix::new(200, piece(0).chain(piece(100))));
+        assert_eq!(sizes(&graph)[0], 0);
     }
 }

@@ -9,10 +9,13 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods, reason = "the same bits on every processor"))]
 
 mod cholesky;
+mod coarsening;
 mod dense;
 mod dissection;
+mod graph;
 mod matrix;
 mod real;
+mod separator;
 mod solve;
 mod supernodes;
 

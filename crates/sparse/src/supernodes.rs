@@ -1,16 +1,16 @@
 //! Supernodes: runs of columns with the same rows below them, which dense kernels treat as one.
 
-use crate::dissection::Graph;
+use crate::graph::{Graph, NONE};
 use std::ops::Range;
 
-/// No node or supernode.
-pub(crate) const NONE: u32 = u32::MAX;
+/// A factor is read in tiles of so many rows and columns: numbers that fill up the last one cost
+/// what others cost.
+const TILE_SIZE: usize = 16;
 
-/// A supernode with its parent in the elimination tree is merged if both together have at most so
-/// many columns of nodes, and at most such a share of its numbers is then a zero that is stored.
-/// (Ashcraft and Grimes, "The influence of relaxed supernode partitions on the multifrontal
-/// method", 1989.)
-const MERGED: [(usize, f64); 3] = [(8, 0.6), (16, 0.25), (usize::MAX, 0.05)];
+/// A supernode is merged with its parent in the elimination tree if both together have at most this
+/// many tiles more than apart: as much as the work on another supernode costs. (Ashcraft and Grimes,
+/// "The influence of relaxed supernode partitions on the multifrontal method", 1989.)
+const MERGED_TILES: usize = 3;
 
 /// A run of columns of the factor.
 #[derive(Clone, Debug)]
@@ -33,7 +33,7 @@ pub(crate) fn elimination_tree(graph: &Graph, order: &[u32], rank: &[u32]) -> Ve
     let mut ancestor = vec![NONE; order.len()];
     for (i, node) in order.iter().enumerate() {
         for neighbour in graph.neighbours(*node) {
-            let mut k = rank[*neighbour as usize];
+            let mut k = rank[neighbour as usize];
             while k < i as u32 {
                 let next = std::mem::replace(&mut ancestor[k as usize], i as u32);
                 if next == NONE {
@@ -117,7 +117,7 @@ pub(crate) fn supernodes<'a, I: Iterator<Item = u32> + 'a>(
 
 /// Nodes in each column of the factor, the diagonal included: those of row i are on the ways up the
 /// tree from its neighbours to i.
-fn column_counts<I: Iterator<Item = u32>>(parent: &[u32], neighbours: &impl Fn(u32) -> I) -> Vec<u32> {
+pub(crate) fn column_counts<I: Iterator<Item = u32>>(parent: &[u32], neighbours: &impl Fn(u32) -> I) -> Vec<u32> {
     let mut counts = vec![1; parent.len()];
     let mut seen = vec![NONE; parent.len()];
     for i in 0..parent.len() as u32 {
@@ -140,7 +140,13 @@ fn fundamental_ends(parent: &[u32], counts: &[u32]) -> Vec<u32> {
     (0..n).filter(|j| j + 1 == n || !continues(*j)).map(|j| j + 1).collect()
 }
 
-/// Merges runs with their parents where few zeros are stored for it.
+/// Tiles of a run of columns that have `height` rows, the diagonal included; all in nodes.
+fn tiles(columns: usize, height: usize) -> usize {
+    let [width, below] = [columns, height - columns].map(|nodes| (3 * nodes).div_ceil(TILE_SIZE));
+    width * (width + 1) / 2 + width * below
+}
+
+/// Merges runs with their parents where that costs few tiles; the ends of all runs.
 fn merge(parent: &[u32], counts: &[u32], ends: &[u32]) -> Vec<u32> {
     /// A run of columns that may still grow.
     struct Run {
@@ -148,26 +154,23 @@ fn merge(parent: &[u32], counts: &[u32], ends: &[u32]) -> Vec<u32> {
         end: u32,
         /// Rows of its first column.
         height: usize,
-        zeros: usize,
     }
+    let size = |run: &Run| tiles((run.end - run.begin) as usize, run.height);
     let mut merged: Vec<Run> = Vec::with_capacity(ends.len());
     // From the root down, so that the run after one is its parent as merged, if it is the parent at
     // all. `merged` has the later runs, the next one last.
     for k in (0..ends.len()).rev() {
         let (begin, end) = (if k == 0 { 0 } else { ends[k - 1] }, ends[k]);
-        let (width, height) = ((end - begin) as usize, counts[begin as usize] as usize);
+        let run = Run { begin, end, height: counts[begin as usize] as usize };
         let up = parent[end as usize - 1];
         if let Some(next) = merged.last_mut().filter(|next| up != NONE && up < next.end) {
-            let columns = width + (next.end - next.begin) as usize;
-            let zeros = next.zeros + width * (next.height + width - height);
-            let numbers = columns * (columns + 1) / 2 + columns * (next.height + width - columns);
-            let share = zeros as f64 / numbers as f64;
-            if MERGED.iter().any(|(most, allowed)| columns <= *most && share < *allowed) {
-                *next = Run { begin, end: next.end, height: next.height + width, zeros };
+            let both = Run { begin, end: next.end, height: next.height + (end - begin) as usize };
+            if size(&both) <= size(&run) + size(next) + MERGED_TILES {
+                *next = both;
                 continue;
             }
         }
-        merged.push(Run { begin, end, height, zeros: 0 });
+        merged.push(run);
     }
     merged.iter().rev().map(|run| run.end).collect()
 }

@@ -10,7 +10,7 @@ fn noise(k: usize) -> f64 {
 
 /// A grid of `n` nodes a side, each joined to the nodes around it by an anisotropic spring, with
 /// every seventh node left out and some nodes joined to nothing.
-fn grid(n: [usize; 3], ground: f64) -> (BlockMatrix, Vec<DVec3>) {
+fn grid(n: [usize; 3], ground: f64) -> BlockMatrix {
     let index = |p: [usize; 3]| p[0] + n[0] * (p[1] + n[1] * p[2]);
     let places: Vec<[usize; 3]> =
         (0..n[2]).flat_map(|z| (0..n[1]).flat_map(move |y| (0..n[0]).map(move |x| [x, y, z]))).collect();
@@ -34,8 +34,7 @@ fn grid(n: [usize; 3], ground: f64) -> (BlockMatrix, Vec<DVec3>) {
             matrix.add(i, j, block * sign);
         }
     }
-    let positions = places.iter().map(|p| DVec3::new(p[0] as f64, p[1] as f64, p[2] as f64)).collect();
-    (matrix, positions)
+    matrix
 }
 
 /// A x.
@@ -54,14 +53,14 @@ fn product(matrix: &BlockMatrix, x: &[f64]) -> Vec<f64> {
     out
 }
 
-fn factor_f64(matrix: &BlockMatrix, positions: &[DVec3], level: Level) -> Cholesky<f64> {
-    let mut factor = Cholesky::new(matrix, positions);
+fn factor_f64(matrix: &BlockMatrix, level: Level) -> Cholesky<f64> {
+    let mut factor = Cholesky::new(matrix);
     assert!(factor.factorise(level, matrix.blocks().map(|(_, _, block)| block.to_cols_array_2d())));
     factor
 }
 
-fn factor_f32(matrix: &BlockMatrix, positions: &[DVec3], level: Level) -> Cholesky<f32> {
-    let mut factor = Cholesky::new(matrix, positions);
+fn factor_f32(matrix: &BlockMatrix, level: Level) -> Cholesky<f32> {
+    let mut factor = Cholesky::new(matrix);
     let blocks = matrix.blocks().map(|(_, _, block)| block.to_cols_array_2d().map(|column| column.map(|v| v as f32)));
     assert!(factor.factorise(level, blocks));
     factor
@@ -70,15 +69,15 @@ fn factor_f32(matrix: &BlockMatrix, positions: &[DVec3], level: Level) -> Choles
 #[test]
 fn solution_satisfies_the_equations() {
     for n in [[1, 1, 1], [2, 1, 1], [5, 4, 3], [12, 3, 3], [9, 10, 8], [40, 6, 5]] {
-        let (matrix, positions) = grid(n, 0.01);
+        let matrix = grid(n, 0.01);
         let expected: Vec<f64> = (0..3 * matrix.len()).map(noise).collect();
         let right = product(&matrix, &expected);
         let mut x = right.clone();
-        factor_f64(&matrix, &positions, Level::new()).solve(Level::new(), &mut x);
+        factor_f64(&matrix, Level::new()).solve(Level::new(), &mut x);
         let off = x.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(off < 1e-10, "{n:?}: off by {off}");
         let mut x: Vec<f32> = right.iter().map(|v| *v as f32).collect();
-        factor_f32(&matrix, &positions, Level::new()).solve(Level::new(), &mut x);
+        factor_f32(&matrix, Level::new()).solve(Level::new(), &mut x);
         let off = x.iter().zip(&expected).map(|(a, b)| (f64::from(*a) - b).abs()).fold(0.0, f64::max);
         assert!(off < 0.01, "{n:?}, single precision: off by {off}");
     }
@@ -86,8 +85,8 @@ fn solution_satisfies_the_equations() {
 
 #[test]
 fn order_is_a_permutation_and_panels_cover_all_columns() {
-    let (matrix, positions) = grid([9, 10, 8], 0.01);
-    let factor = factor_f64(&matrix, &positions, Level::new());
+    let matrix = grid([9, 10, 8], 0.01);
+    let factor = factor_f64(&matrix, Level::new());
     let mut order = factor.order().to_vec();
     order.sort_unstable();
     assert_eq!(order, (0..matrix.len() as u32).collect::<Vec<_>>());
@@ -102,8 +101,8 @@ fn order_is_a_permutation_and_panels_cover_all_columns() {
 
 #[test]
 fn inverse_of_a_triangle_times_the_triangle_is_the_identity() {
-    let (matrix, positions) = grid([9, 10, 8], 0.01);
-    let factor = factor_f64(&matrix, &positions, Level::new());
+    let matrix = grid([9, 10, 8], 0.01);
+    let factor = factor_f64(&matrix, Level::new());
     let widest = factor.panels().map(|panel| panel.width()).max().unwrap();
     assert!(widest > 64, "{widest} columns");
     let mut inverse = Vec::new();
@@ -122,9 +121,9 @@ fn inverse_of_a_triangle_times_the_triangle_is_the_identity() {
 
 #[test]
 fn bits_depend_neither_on_threads_nor_on_instructions() {
-    let (matrix, positions) = grid([16, 16, 16], 0.01);
+    let matrix = grid([16, 16, 16], 0.01);
     let bits = |level: Level| -> Vec<u32> {
-        let factor = factor_f32(&matrix, &positions, level);
+        let factor = factor_f32(&matrix, level);
         let mut x: Vec<f32> = (0..3 * matrix.len()).map(|k| noise(k) as f32).collect();
         factor.solve(level, &mut x);
         let numbers = factor.panels().flat_map(|p| (0..p.width()).map(move |k| p.at(p.width() - 1, k).to_bits()));
@@ -139,8 +138,8 @@ fn bits_depend_neither_on_threads_nor_on_instructions() {
 
 #[test]
 fn indefinite_and_non_finite_matrices_are_refused() {
-    let (mut matrix, positions) = grid([5, 4, 3], 0.01);
-    let mut factor = Cholesky::<f64>::new(&matrix, &positions);
+    let mut matrix = grid([5, 4, 3], 0.01);
+    let mut factor = Cholesky::<f64>::new(&matrix);
     let mut done = |matrix: &BlockMatrix| {
         factor.factorise(Level::new(), matrix.blocks().map(|(_, _, block)| block.to_cols_array_2d()))
     };

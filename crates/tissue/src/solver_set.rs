@@ -16,7 +16,8 @@ pub(crate) trait SolverSet: Send + Sync {
     fn another(&self) -> Box<dyn SolverSet>;
 
     /// Changes to another model; bodies that both have in common keep their solvers.
-    /// `single_thread`: the calling thread does all the work.
+    /// `single_thread`: the calling thread does all the work. New solvers are made on the threads of
+    /// the pool that calls.
     fn set_model(&mut self, model: &Model, single_thread: bool);
 
     /// Whether the model is the one that was set, and the state is one of it.
@@ -88,13 +89,14 @@ impl<S: Solver + 'static> SolverSet for BodySolvers<S> {
 
     fn set_model(&mut self, model: &Model, single_thread: bool) {
         let mut old = std::mem::take(&mut self.slots);
-        for (index, body) in model.bodies.iter().enumerate() {
-            let slot = match old.iter().position(|slot| slot.body.is(body)) {
-                Some(at) => BodySlot { index, ..old.swap_remove(at) },
-                None => BodySlot::new(index, body, (self.make)(body, single_thread), BodyState::at_rest(body)),
-            };
-            self.slots.push(slot);
-        }
+        let mut take = |body| old.iter().position(|slot| slot.body.is(body)).map(|at| old.swap_remove(at));
+        let mut slots: Vec<(&Body, Option<BodySlot<S>>)> = model.bodies.iter().map(|body| (body, take(body))).collect();
+        crate::threads::for_each(&mut slots, |(body, slot)| {
+            let make = || BodySlot::new(0, body, (self.make)(body, single_thread), BodyState::at_rest(body));
+            slot.get_or_insert_with(make);
+        });
+        let slots = slots.into_iter().filter_map(|(_, slot)| slot).enumerate();
+        self.slots = slots.map(|(index, slot)| BodySlot { index, ..slot }).collect();
         self.islands = Islands::new(&self.slots);
         self.contact = model.body_contact;
         self.filtered.clone_from(&model.filtered);

@@ -144,7 +144,10 @@ impl Stepper {
         } else if self.pool.is_none() {
             self.pool = Some(trocar_core::thread_pool(self.threads).map_err(Error::Model)?);
         }
-        self.solvers.set_model(model, single_thread);
+        match &self.pool {
+            Some(pool) => pool.install(|| self.solvers.set_model(model, single_thread)),
+            None => self.solvers.set_model(model, single_thread),
+        }
         Ok(())
     }
 

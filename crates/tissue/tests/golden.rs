@@ -64,7 +64,7 @@ fn rigid_grasp_and_supports() {
     state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY));
     let tools = |k: usize| vec![at(DVec3::new(1e-3, 0.0, 5e-3) * bump(k, 60))];
     let found = hashes(&model, &state, 60, &tools, &[]);
-    check("rigid grasp and supports", found, [0x7822b64d696ee31b, 0x4ef911657db81c68, 0x076af93f8376e204]);
+    check("rigid grasp and supports", found, [0x9d30aa8ca7b17400, 0x4ef911657db81c68, 0x076af93f8376e204]);
 }
 
 /// A block on a pinned one, a third that flies into them, jaws that lift one compliantly, a probe.
@@ -126,7 +126,7 @@ fn lift_and_probe(frame: usize) -> Vec<Pose> {
 fn bodies_and_tools_that_touch() {
     let (model, state) = touching_bodies();
     let found = hashes(&model, &state, 40, &lift_and_probe, &[]);
-    check("bodies and tools that touch", found, [0xd53ea3b2a9789469, 0x0d1708b41bcb6975, 0x055e40eba2d49827]);
+    check("bodies and tools that touch", found, [0x3beec752a0acb48f, 0x0d1708b41bcb6975, 0x055e40eba2d49827]);
 }
 
 /// Loads, a state with inverted elements, and one that is stretched.
@@ -145,7 +145,7 @@ fn loads_and_disturbed_states() {
     let loads = [(0, 40, DVec3::new(0.01, 0.0, 0.02)), (2, 5, DVec3::new(0.0, 1e-3, 1e-3))];
     let loads = loads.map(|(body, node, force)| Load { body, node, force });
     let found = hashes(&model, &state, 20, &lift_and_probe, &loads);
-    check("loads and disturbed states", found, [0xc17d4cb7ca35132c, 0xcd360257a027b56f, 0x19e95c2450f8cd8a]);
+    check("loads and disturbed states", found, [0xaf6af53cfab135e6, 0xcd360257a027b56f, 0x19e95c2450f8cd8a]);
 }
 
 /// A block that a rigid grasp crushes.
@@ -159,7 +159,7 @@ fn crushed_block() {
     state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY));
     let tools = |k: usize| vec![at(DVec3::new(3e-3, 0.0, -5.5e-3) * bump(k, 30))];
     let found = hashes(&model, &state, 30, &tools, &[]);
-    check("crushed block", found, [0x59f1e59334a65ccd, 0xaa5ba28d0a7f7b46, 0xd4a0413ba037c401]);
+    check("crushed block", found, [0xed8cf8f8b68c2a92, 0xaa5ba28d0a7f7b46, 0xd4a0413ba037c401]);
 }
 
 /// A block on a plane, crushed and hit by a ball.
@@ -186,7 +186,7 @@ fn struck_block() {
         vec![at(DVec3::new(2e-3, 0.0, -11e-3) * t), at(DVec3::new(8e-3, 0.0, -3e-3) * t)]
     };
     let found = hashes(&model, &state, 24, &tools, &[]);
-    check("struck block", found, [0xdfbb86791cb149db, 0x3c20022facd7e2f5, 0xc8346ceee9b40c32]);
+    check("struck block", found, [0x9a71576e0e660f47, 0x3c20022facd7e2f5, 0xc8346ceee9b40c32]);
 }
 
 /// Elements pressed almost flat, thrown inwards and hit: it overstretches.
@@ -208,7 +208,7 @@ fn flat_elements() {
     }
     let tools = |k: usize| vec![at(DVec3::new(0.0, 0.0, -9e-3) * bump(k, 6))];
     let found = hashes(&model, &state, 12, &tools, &[]);
-    check("flat elements", found, [0xa356d09a822c5cc3, 0x2cb97c27f08a2397, 0xf5a74bf1cbfeb030]);
+    check("flat elements", found, [0x5c5ac4b1ded3ac4b, 0x2cb97c27f08a2397, 0xf5a74bf1cbfeb030]);
 }
 
 /// A spring of negative stiffness: the matrix has no Cholesky factor, and sweeps take over in the
@@ -220,5 +220,5 @@ fn fallback_to_sweeps() {
         jaws.stiffness = -30.0;
     }
     let found = hashes(&model, &state, 12, &lift_and_probe, &[]);
-    check("fallback to sweeps", found, [0x4da7adcc8d3daa95, 0x77f5de6435d096d2, 0xb417e5e4aac10469]);
+    check("fallback to sweeps", found, [0xaaae6882dc53770c, 0x77f5de6435d096d2, 0xb417e5e4aac10469]);
 }

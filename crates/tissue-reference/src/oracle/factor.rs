@@ -12,10 +12,9 @@ pub(crate) struct Factor {
 }
 
 impl Factor {
-    /// Orders and analyses a matrix of nodes that lie at `rest` (m).
-    pub fn new(matrix: &Stiffness, rest: &[DVec3]) -> Self {
-        let positions: Vec<DVec3> = matrix.free().iter().map(|i| rest[*i]).collect();
-        Self { cholesky: Cholesky::new(matrix.matrix(), &positions), right: vec![0.0; 3 * positions.len()] }
+    /// Orders and analyses a matrix.
+    pub fn new(matrix: &Stiffness) -> Self {
+        Self { cholesky: Cholesky::new(matrix.matrix()), right: vec![0.0; 3 * matrix.free().len()] }
     }
 
     /// Factorises; false if the matrix is not positive definite.

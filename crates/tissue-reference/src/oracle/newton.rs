@@ -72,7 +72,7 @@ impl Solver {
         };
         if !self.system.as_ref().is_some_and(fits) {
             let matrix = Stiffness::with_pairs(&potential.elastic.tets, &coupled, fixed);
-            let factor = Factor::new(&matrix, &potential.elastic.rest);
+            let factor = Factor::new(&matrix);
             self.system = Some(System { fixed: fixed.to_vec(), coupled, matrix, factor });
         }
         self.system.as_mut().ok_or(Failure::Singular)

@@ -109,7 +109,7 @@ impl<'a> Solver<'a> {
             pairs.extend((0..nodes.len()).flat_map(|a| (0..a).map(move |b| [nodes[a], nodes[b]])));
         }
         let matrix = Stiffness::with_pairs(&[], &pairs, held);
-        let factor = Factor::new(&matrix, &elements.rest);
+        let factor = Factor::new(&matrix);
         let volume: f64 = elements.shares().iter().sum();
         let stiffest =
             |value: &dyn Fn(&trocar_tissue::Material) -> f64| elements.materials.iter().map(value).fold(0.0, f64::max);

@@ -244,7 +244,7 @@ mod tests {
             let off = DMat3::from_cols_array(&[0, 1, 2, 3, 4, 5, 6, 7, 8].map(number));
             matrix.add(i, j, if i == j { DMat3::from_diagonal(DVec3::splat(30.0)) } else { off });
         }
-        let mut cholesky = Cholesky::<f64>::new(&matrix, &mesh.vertices);
+        let mut cholesky = Cholesky::<f64>::new(&matrix);
         let level = Isa::detect().level();
         assert!(cholesky.factorise(level, matrix.blocks().map(|(_, _, b)| b.to_cols_array_2d())));
         let factor = Factor::new(level, &cholesky, count);

@@ -119,7 +119,7 @@ impl Topology {
             return Err(Error::Body { body: body.name().to_owned(), reason });
         }
         let stiffness = stiffness(body);
-        let cholesky = Cholesky::<f64>::new(&stiffness, lattice.nodes());
+        let cholesky = Cholesky::<f64>::new(&stiffness);
         let order = cholesky.order();
         let mut places = vec![0; order.len()];
         order.iter().enumerate().for_each(|(place, node)| places[*node as usize] = place as u32);
@@ -169,7 +169,7 @@ impl Topology {
                 matrix.add(node as u32, node as u32, DMat3::from_diagonal(DVec3::splat(mass * inertia)));
             }
         }
-        let mut cholesky = Cholesky::<f64>::new(&matrix, body.lattice().nodes());
+        let mut cholesky = Cholesky::<f64>::new(&matrix);
         if !cholesky.factorise(level, matrix.blocks().map(|(_, _, block)| block.to_cols_array_2d())) {
             let reason = "has a singular stiffness; pin more of it".to_owned();
             return Err(Error::Body { body: body.name().to_owned(), reason });

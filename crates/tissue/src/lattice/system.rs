@@ -63,12 +63,10 @@ impl LatticeSystem {
     /// For a lattice.
     pub fn new(embedding: &EmbeddingData) -> Self {
         let matrix = embedding.body.stiffness_pattern();
-        let rest = embedding.body.lattice().nodes();
-        let cholesky = Cholesky::new(&matrix, rest);
         Self {
+            cholesky: Cholesky::new(&matrix),
+            numbers: vec![0.0; 3 * matrix.len()],
             matrix,
-            cholesky,
-            numbers: vec![0.0; 3 * rest.len()],
             factorised: false,
             flow: Flow::default(),
             flows: false,

@@ -6,7 +6,7 @@ use crate::Body;
 use crate::assembly::{Stiffness, blocks, shape_gradients, tangent};
 use crate::lanes::Row;
 use fearless_simd::{Level, Simd};
-use glam::{DMat3, DVec3, Vec3A};
+use glam::{DMat3, Vec3A};
 use std::ops::Range;
 use trocar_sparse::Cholesky;
 
@@ -53,9 +53,8 @@ impl Factor {
             }
         }
         add_dashpots(body, h, &mut rest);
-        let positions: Vec<DVec3> = rest.free().iter().map(|i| mesh.vertices[*i]).collect();
-        let cholesky = Cholesky::new(rest.matrix(), &positions);
-        let mut rank = vec![0; positions.len()];
+        let cholesky = Cholesky::new(rest.matrix());
+        let mut rank = vec![0; rest.free().len()];
         cholesky.order().iter().enumerate().for_each(|(k, i)| rank[*i as usize] = k as u32);
         Some(Self {
             scale: vec![0.0; 3 * rank.len()],
