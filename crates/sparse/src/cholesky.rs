@@ -56,7 +56,8 @@ struct Place {
 }
 
 impl<T: Real> Cholesky<T> {
-    /// Analyses the pattern of `matrix`. Numbers follow with [`Self::factorise`].
+    /// Analyses the pattern of `matrix`, on the threads of the rayon pool that calls; outside of a
+    /// pool the caller does all the work. Numbers follow with [`Self::factorise`].
     pub fn new(matrix: &BlockMatrix) -> Self {
         let graph = Graph::new(matrix);
         let dissected = dissect(&graph);

@@ -13,8 +13,8 @@ pub(crate) struct Coarser {
 }
 
 impl Coarser {
-    /// Makes one node of each node and its neighbour by the heaviest edge, as far as that is not
-    /// taken yet and both together weigh at most `most`. Another `turn` takes the nodes in another
+    /// Makes one node of each node and a neighbour: of those that are free and with which it weighs
+    /// at most `most`, the one with the heaviest edge. Another `turn` takes the nodes in another
     /// order.
     pub fn new(fine: &Graph, most: u32, turn: u32) -> Self {
         let (pairs, of) = pairs(fine, most, turn);

@@ -15,10 +15,10 @@ use trocar_core::has_threads;
 const MAX_LEAF_NODES: usize = 16;
 
 /// Graphs of at most this many nodes are not made coarser.
-const COARSEST: usize = 80;
+const MAX_COARSEST_NODES: usize = 80;
 
 /// A coarser graph with more than this share of the nodes is of no use.
-const MAX_COARSER: f64 = 0.9;
+const MAX_COARSENING_RATIO: f64 = 0.9;
 
 /// Cuts of a part that is made coarser, each from another coarser graph; the best counts.
 const CUTS: u32 = 3;
@@ -26,12 +26,12 @@ const CUTS: u32 = 3;
 /// Nodes of the coarsest graph that a half grows from; the best cut counts.
 const SEEDS: usize = 3;
 
-/// Parts of at least this many nodes are worth a thread of their own.
-const MIN_NODES: usize = 200;
+/// Halves of parts of at least this many nodes are worth a thread each.
+const MIN_PARALLEL_NODES: usize = 200;
 
 /// The nodes of `graph` in the order of elimination: first eliminated first.
 pub(crate) fn dissect(graph: &Graph) -> Vec<u32> {
-    let nodes = graph.nodes().collect();
+    let mut nodes: Vec<u32> = graph.nodes().collect();
     if graph.len() <= MAX_LEAF_NODES {
         return nodes;
     }
@@ -39,11 +39,13 @@ pub(crate) fn dissect(graph: &Graph) -> Vec<u32> {
     let on = |side: u8| graph.nodes().filter(|i| sides[*i as usize] == side).collect::<Vec<u32>>();
     let (separator, halves) = (on(SEPARATOR), [on(1), on(2)]);
     if halves.iter().any(Vec::is_empty) {
+        // Nodes that are joined to many others last.
+        nodes.sort_by_key(|i| graph.edges(*i).len());
         return nodes;
     }
     let order = |half: &[u32]| dissect(&graph.part(half)).into_iter().map(|k| half[k as usize]).collect::<Vec<u32>>();
     let [a, b] = &halves;
-    let (a, b) = match has_threads() && graph.len() >= MIN_NODES {
+    let (a, b) = match has_threads() && graph.len() >= MIN_PARALLEL_NODES {
         true => rayon::join(|| order(a), || order(b)),
         false => (order(a), order(b)),
     };
@@ -52,17 +54,17 @@ pub(crate) fn dissect(graph: &Graph) -> Vec<u32> {
 
 /// The cut with the smallest separator; the side of each node.
 fn best_cut(graph: &Graph) -> Vec<u8> {
-    let cuts = (0..if graph.len() > COARSEST { CUTS } else { 1 }).map(|turn| cut(graph, turn));
+    let cuts = (0..if graph.len() > MAX_COARSEST_NODES { CUTS } else { 1 }).map(|turn| cut(graph, turn));
     cuts.min_by_key(|sides| graph.weight_of(sides, SEPARATOR)).unwrap_or_default()
 }
 
 /// Cuts a graph; another `turn` makes it coarser in another way.
 fn cut(graph: &Graph, turn: u32) -> Vec<u8> {
-    if graph.len() <= COARSEST {
+    if graph.len() <= MAX_COARSEST_NODES {
         return first_cut(graph);
     }
-    let coarser = Coarser::new(graph, graph.weight().div_ceil(COARSEST as u32 / 2), turn);
-    if coarser.graph.len() as f64 > MAX_COARSER * graph.len() as f64 {
+    let coarser = Coarser::new(graph, graph.weight().div_ceil(MAX_COARSEST_NODES as u32 / 2), turn);
+    if coarser.graph.len() as f64 > MAX_COARSENING_RATIO * graph.len() as f64 {
         return first_cut(graph);
     }
     let coarse = cut(&coarser.graph, turn);
@@ -87,10 +89,9 @@ fn grow(graph: &Graph, seed: u32) -> Vec<u8> {
     let distances = graph.distances(seed);
     let mut near: Vec<u32> = graph.nodes().collect();
     near.sort_by_key(|i| distances[*i as usize]);
-    let mut sides = vec![2; graph.len()];
-    let mut weight = 0;
+    let (mut sides, mut weight, half) = (vec![2; graph.len()], 0, graph.weight().div_ceil(2));
     for i in near {
-        if 2 * weight >= graph.weight() {
+        if weight >= half {
             break;
         }
         sides[i as usize] = 1;
@@ -178,33 +179,52 @@ mod tests {
 
     #[test]
     fn grids_fill_in_less_than_by_planes() {
-        for n in [[15, 15, 15], [31, 15, 7], [40, 6, 5]] {
+        for (n, share) in [([15, 15, 15], 0.8), ([31, 15, 7], 0.8), ([40, 6, 5], 0.95)] {
             let graph = grid(n);
             let mut planes = Vec::new();
             by_planes(n, [0; 3], n, &mut planes);
             let [ours, planes] = [dissect(&graph), planes].map(|order| fill(&graph, &order));
-            assert!(ours < planes, "{n:?}: {ours} numbers, {planes} by planes");
+            assert!(f64::from(ours) < share * f64::from(planes), "{n:?}: {ours} numbers, {planes} by planes");
         }
+    }
+
+    fn graph(nodes: usize, pairs: impl IntoIterator<Item = (u32, u32)>) -> Graph {
+        Graph::new(&BlockMatrix::new(nodes, pairs.into_iter()))
+    }
+
+    /// A path of nodes from the first on.
+    fn path(first: u32, nodes: u32) -> impl Iterator<Item = (u32, u32)> {
+        (first + 1..first + nodes).map(|i| (i - 1, i))
     }
 
     #[test]
     fn any_graph_has_an_order() {
-        let star: Vec<(u32, u32)> = (1..200).map(|i| (0, i)).collect();
-        let complete: Vec<(u32, u32)> = (0..90).flat_map(|i| (0..i).map(move |j| (i, j))).collect();
-        let path: Vec<(u32, u32)> = (1..300).map(|i| (i - 1, i)).collect();
-        for (nodes, pairs) in
-            [(200, star), (90, complete), (300, path), (100, Vec::new()), (1, Vec::new()), (0, Vec::new())]
-        {
-            let mut order = dissect(&Graph::new(&BlockMatrix::new(nodes, pairs.into_iter())));
+        let star = graph(200, (1..200).map(|i| (0, i)));
+        let complete = graph(90, (0..90).flat_map(|i| (0..i).map(move |j| (i, j))));
+        for graph in [star, complete, graph(300, path(0, 300)), graph(100, []), graph(1, []), graph(0, [])] {
+            let mut order = dissect(&graph);
             order.sort_unstable();
-            assert_eq!(order, (0..nodes as u32).collect::<Vec<_>>());
+            assert_eq!(order, graph.nodes().collect::<Vec<_>>());
         }
     }
 
     #[test]
-    fn two_pieces_are_cut_between_them() {
-        let piece = |first: u32| (1..100).map(move |i| (first + i - 1, first + i));
-        let graph = Graph::new(&BlockMatrix::new(200, piece(0).chain(piece(100))));
-        assert_eq!(sizes(&graph)[0], 0);
+    fn nodes_that_all_others_have_an_edge_to_come_last() {
+        for hubs in [1, 60] {
+            let graph = graph(2000, (hubs..2000).flat_map(|i| (0..hubs).map(move |hub| (hub, i))));
+            let fill = fill(&graph, &dissect(&graph));
+            let least = 2000 + (2000 - hubs) * hubs + hubs * (hubs - 1) / 2;
+            assert!(fill <= least, "{hubs} hubs: {fill} numbers, {least} would do");
+        }
+    }
+
+    #[test]
+    fn pieces_are_cut_between_them_or_once() {
+        for (pieces, most) in [(vec![100, 100], 0), (vec![100; 3], 1), (vec![70, 80, 150], 1), (vec![90; 4], 0)] {
+            let first = |k: usize| pieces[..k].iter().sum::<u32>();
+            let pairs = (0..pieces.len()).flat_map(|k| path(first(k), pieces[k]));
+            let [separator, ..] = sizes(&graph(first(pieces.len()) as usize, pairs));
+            assert!(separator <= most, "{pieces:?}: {separator} nodes");
+        }
     }
 }

@@ -80,12 +80,19 @@ impl Graph {
         self.weights.iter().zip(sides).filter(|(_, of)| **of == side).map(|(weight, _)| weight).sum()
     }
 
-    /// Distances from a node in edges; nodes that are not connected to it are the farthest.
+    /// Distances from a node in edges. From the farthest node it goes on to the first one that is
+    /// not connected to it, as if they had an edge.
     pub fn distances(&self, from: u32) -> Vec<u32> {
         let mut distances = vec![NONE; self.len()];
         distances[from as usize] = 0;
-        let (mut reached, mut next) = (vec![from], 0);
-        while let Some(i) = reached.get(next).copied() {
+        let (mut reached, mut next, mut known) = (vec![from], 0, 0);
+        while next < self.len() {
+            if next == reached.len() {
+                known += distances[known..].iter().take_while(|distance| **distance != NONE).count();
+                distances[known] = distances[reached[next - 1] as usize] + 1;
+                reached.push(known as u32);
+            }
+            let i = reached[next];
             next += 1;
             for j in self.neighbours(i) {
                 if distances[j as usize] == NONE {
@@ -103,5 +110,5 @@ impl Graph {
     }
 }
 
-/// No node, and a distance to none.
+/// No node, or no distance yet.
 pub(crate) const NONE: u32 = u32::MAX;

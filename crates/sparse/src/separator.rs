@@ -13,11 +13,11 @@ use std::collections::BinaryHeap;
 /// The side of nodes in the separator; the halves are 1 and 2.
 pub(crate) const SEPARATOR: u8 = 0;
 
-/// Greatest share of the nodes in one half.
+/// No node moves to a half that has more than this share of the weight then.
 const MAX_HALF: f64 = 0.6;
 
-/// A pass ends after as many moves that did not make the separator smaller as it has nodes, within
-/// these bounds.
+/// A pass ends after so many moves in a row that did not improve the cut: the weight of the
+/// separator, within these bounds.
 const PATIENCE: [u32; 2] = [8, 50];
 
 /// Passes at most.
@@ -33,7 +33,7 @@ pub(crate) struct Separator<'a> {
     max_half: u32,
     /// Whether each node has left the separator in this pass.
     moved: Vec<bool>,
-    /// Growth of the separator if a node of it moves to each half.
+    /// Growth of the separator if a node of it moves to each half: minus the move's gain.
     growth: [Vec<i32>; 2],
     /// Nodes that may move to each half, by this growth; also entries that are out of date.
     queues: [BinaryHeap<Reverse<(i32, u32)>>; 2],
@@ -49,7 +49,7 @@ impl<'a> Separator<'a> {
         Self { graph, sides, weights, max_half, moved: vec![false; graph.len()], growth, queues }
     }
 
-    /// Moves nodes until no pass makes the separator smaller.
+    /// Moves nodes, in a few passes, until one does not improve the cut.
     pub fn refine(mut self) {
         for _ in 0..MAX_PASSES {
             if !self.pass() {
@@ -58,20 +58,14 @@ impl<'a> Separator<'a> {
         }
     }
 
-    /// Size of the separator, then how uneven the halves are.
+    /// Weight of the separator, then how uneven the halves are. Less is better.
     fn quality(&self) -> (u32, u32) {
         (self.weights[0], self.weights[1].abs_diff(self.weights[2]))
     }
 
     /// One pass: each node leaves the separator at most once. Returns whether it is better.
     fn pass(&mut self) -> bool {
-        self.moved.fill(false);
-        self.queues.iter_mut().for_each(BinaryHeap::clear);
-        for i in self.graph.nodes() {
-            if self.sides[i as usize] == SEPARATOR {
-                self.queue(i);
-            }
-        }
+        self.fill_queues();
         let begin = self.quality();
         let (mut best, mut log, mut kept, mut in_vain) = (begin, Vec::new(), 0, 0);
         while let Some((node, to)) = self.next() {
@@ -87,6 +81,17 @@ impl<'a> Separator<'a> {
             self.set(node, side);
         }
         best < begin
+    }
+
+    /// Begins a pass: all nodes of the separator may move.
+    fn fill_queues(&mut self) {
+        self.moved.fill(false);
+        self.queues.iter_mut().for_each(BinaryHeap::clear);
+        for i in self.graph.nodes() {
+            if self.sides[i as usize] == SEPARATOR {
+                self.queue(i);
+            }
+        }
     }
 
     /// The next move: the one that lets the separator grow least, then the one to the lighter half.
@@ -165,6 +170,78 @@ impl<'a> Separator<'a> {
                 if !self.moved[i] {
                     self.queues[k].push(Reverse((self.growth[k][i], near)));
                 }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::graph::Edge;
+
+    /// A number below `most` for each counter.
+    fn noise(k: u32, most: u32) -> u32 {
+        (k.wrapping_mul(0x9E37_79B9) ^ k.rotate_left(13)).wrapping_mul(0x85EB_CA6B) % most
+    }
+
+    /// A graph of nodes of different weights around a ring, joined to others nearby.
+    fn ring(nodes: u32) -> Graph {
+        let near = |i: u32, j: u32| {
+            let apart = i.abs_diff(j).min(nodes - i.abs_diff(j));
+            apart == 1 || (2..9).contains(&apart) && noise(i.min(j) * nodes + i.max(j), 3) == 0
+        };
+        let mut graph = Graph::with_capacity(nodes as usize);
+        for i in 0..nodes {
+            let edges = (0..nodes).filter(|j| *j != i && near(i, *j)).map(|to| Edge { to, weight: 1 });
+            graph.push(1 + noise(i, 4), edges);
+        }
+        graph
+    }
+
+    /// A cut of the ring with a wide separator on either side.
+    fn wide(nodes: u32) -> Vec<u8> {
+        (0..nodes).map(|i| [1, SEPARATOR, 2, SEPARATOR][(4 * i / nodes) as usize]).collect()
+    }
+
+    #[test]
+    fn growth_and_weights_are_those_of_the_sides() {
+        let graph = ring(200);
+        let mut sides = wide(200);
+        let mut separator = Separator::new(&graph, &mut sides);
+        separator.fill_queues();
+        let mut moves = 0;
+        let mut log = Vec::new();
+        while let Some((node, to)) = separator.next() {
+            let growth = separator.growth[usize::from(to - 1)][node as usize];
+            let before = separator.weights[0] as i32;
+            separator.apply(node, to, &mut log);
+            assert_eq!(separator.weights[0] as i32 - before, growth);
+            assert_eq!(separator.weights, [0, 1, 2].map(|side| graph.weight_of(separator.sides, side)));
+            for i in graph.nodes().filter(|i| separator.sides[*i as usize] == SEPARATOR) {
+                let pulled = |to: u8| {
+                    let other = graph.neighbours(i).filter(|j| separator.sides[*j as usize] == 3 - to);
+                    other.map(|j| graph.weights[j as usize] as i32).sum::<i32>() - graph.weights[i as usize] as i32
+                };
+                assert_eq!([0, 1].map(|k| separator.growth[k][i as usize]), [1, 2].map(pulled), "node {i}");
+            }
+            moves += 1;
+        }
+        assert!(moves > 50, "{moves} moves");
+    }
+
+    #[test]
+    fn a_pass_leaves_a_better_cut() {
+        let graph = ring(200);
+        let mut sides = wide(200);
+        let before = graph.weight_of(&sides, SEPARATOR);
+        Separator::new(&graph, &mut sides).refine();
+        let after = graph.weight_of(&sides, SEPARATOR);
+        assert!(4 * after < before, "{before} before, {after} after");
+        for i in graph.nodes() {
+            for j in graph.neighbours(i) {
+                let [a, b] = [i, j].map(|k| sides[k as usize]);
+                assert!(a == b || a == SEPARATOR || b == SEPARATOR, "an edge from {i} to {j} joins the halves");
             }
         }
     }

@@ -1,15 +1,16 @@
 //! Supernodes: runs of columns with the same rows below them, which dense kernels treat as one.
 
+use crate::Real;
 use crate::graph::{Graph, NONE};
 use std::ops::Range;
 
-/// A factor is read in tiles of so many rows and columns: numbers that fill up the last one cost
-/// what others cost.
-const TILE_SIZE: usize = 16;
+/// Rows and columns of a tile. Fronts are stored, and a factor in single precision is read, in
+/// vectors of so many numbers: those that fill up the last one cost what others cost.
+const TILE_SIZE: usize = f32::LANES;
 
 /// A supernode is merged with its parent in the elimination tree if both together have at most this
-/// many tiles more than apart: as much as the work on another supernode costs. (Ashcraft and Grimes,
-/// "The influence of relaxed supernode partitions on the multifrontal method", 1989.)
+/// many tiles more than apart. That is what the work on another supernode costs. (Ashcraft and
+/// Grimes, "The influence of relaxed supernode partitions on the multifrontal method", 1989.)
 const MERGED_TILES: usize = 3;
 
 /// A run of columns of the factor.

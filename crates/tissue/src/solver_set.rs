@@ -15,9 +15,8 @@ pub(crate) trait SolverSet: Send + Sync {
     /// Another set of the same solvers and settings, for no body yet.
     fn another(&self) -> Box<dyn SolverSet>;
 
-    /// Changes to another model; bodies that both have in common keep their solvers.
-    /// `single_thread`: the calling thread does all the work. New solvers are made on the threads of
-    /// the pool that calls.
+    /// Changes to another model; bodies that both have in common keep their solvers. New ones are
+    /// made on the threads of the pool that calls; by the calling thread if `single_thread`.
     fn set_model(&mut self, model: &Model, single_thread: bool);
 
     /// Whether the model is the one that was set, and the state is one of it.
@@ -91,10 +90,14 @@ impl<S: Solver + 'static> SolverSet for BodySolvers<S> {
         let mut old = std::mem::take(&mut self.slots);
         let mut take = |body| old.iter().position(|slot| slot.body.is(body)).map(|at| old.swap_remove(at));
         let mut slots: Vec<(&Body, Option<BodySlot<S>>)> = model.bodies.iter().map(|body| (body, take(body))).collect();
-        crate::threads::for_each(&mut slots, |(body, slot)| {
-            let make = || BodySlot::new(0, body, (self.make)(body, single_thread), BodyState::at_rest(body));
-            slot.get_or_insert_with(make);
-        });
+        let make = |(body, slot): &mut (&Body, Option<BodySlot<S>>)| {
+            let new = || BodySlot::new(0, body, (self.make)(body, single_thread), BodyState::at_rest(body));
+            slot.get_or_insert_with(new);
+        };
+        match single_thread {
+            true => slots.iter_mut().for_each(make),
+            false => crate::threads::for_each(&mut slots, make),
+        }
         let slots = slots.into_iter().filter_map(|(_, slot)| slot).enumerate();
         self.slots = slots.map(|(index, slot)| BodySlot { index, ..slot }).collect();
         self.islands = Islands::new(&self.slots);
