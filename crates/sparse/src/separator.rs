@@ -175,6 +175,17 @@ impl<'a> Separator<'a> {
     }
 }
 
+/// Asserts that no edge joins the halves.
+#[cfg(test)]
+pub(crate) fn assert_apart(graph: &Graph, sides: &[u8]) {
+    for i in graph.nodes() {
+        for j in graph.neighbours(i) {
+            let [a, b] = [i, j].map(|k| sides[k as usize]);
+            assert!(a == b || a == SEPARATOR || b == SEPARATOR, "an edge from {i} to {j} joins the halves");
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -238,11 +249,6 @@ mod tests {
         Separator::new(&graph, &mut sides).refine();
         let after = graph.weight_of(&sides, SEPARATOR);
         assert!(4 * after < before, "{before} before, {after} after");
-        for i in graph.nodes() {
-            for j in graph.neighbours(i) {
-                let [a, b] = [i, j].map(|k| sides[k as usize]);
-                assert!(a == b || a == SEPARATOR || b == SEPARATOR, "an edge from {i} to {j} joins the halves");
-            }
-        }
+        assert_apart(&graph, &sides);
     }
 }

@@ -201,16 +201,21 @@ mod tests {
         right.iter().enumerate().for_each(|(k, x)| unpacked[numbers(k)] = *x);
         factor.solve(level, &mut unpacked);
         let most = unpacked.iter().fold(0.0f32, |most, x| most.max(x.abs()));
-        for (precise, rounding) in [(true, 1e-3), (false, 0.03)] {
+        let squares = |numbers: &[f32]| numbers.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>();
+        // The worst of 17,496 numbers depends on the order of elimination and on the right side: with
+        // others it is up to 4%. The mean hardly does.
+        for (precise, worst, mean) in [(true, 1e-3, 1e-3), (false, 0.03, 0.012)] {
             tiles.end_whole();
             let whole = solve(&mut tiles, precise);
             tiles.end();
             assert!(tiles.parts() >= 2, "the factor is too small to be cut");
             let parts = solve(&mut tiles, precise);
             assert!(whole.iter().zip(&parts).all(|(a, b)| (a - b).abs() < 1e-4 * most));
-            let off = |(k, x): (usize, &f32)| (x - unpacked[numbers(k)]).abs();
-            let worst = parts[..right.len()].iter().enumerate().map(off).fold(0.0, f32::max) / most;
-            assert!(worst < rounding, "the packed factor's solution is off by {worst}");
+            let off: Vec<f32> = (0..right.len()).map(|k| parts[k] - unpacked[numbers(k)]).collect();
+            let found = off.iter().fold(0.0f32, |most, x| most.max(x.abs())) / most;
+            assert!(found < worst, "the packed factor's solution is off by {found}");
+            let found = (squares(&off) / squares(&unpacked)).sqrt();
+            assert!(found < mean, "the packed factor's solution is off by {found} in the root mean square");
             for threads in [1, 2, 3] {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 assert!(pool.install(|| solve(&mut tiles, precise)) == parts, "{threads} threads");
