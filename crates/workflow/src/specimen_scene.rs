@@ -158,7 +158,8 @@ pub(crate) fn source(folder: &Path) -> SpecimenSource {
     SpecimenSource::folder(&folder.display().to_string())
 }
 
-/// Two cameras: one close to the organ from the front, and one that sees the whole specimen.
+/// Two cameras: one close to the organ, and one that sees the whole specimen. They are on the side of
+/// the room from which its lamp shines (`trocar_sensors`).
 fn cameras(specimen: &Specimen, placement: &Pose, organ: &str) -> Vec<CellCamera> {
     let bounds = |of: &dyn Fn(&str) -> bool| {
         let points = specimen.organs.iter().filter(|o| of(&o.name)).flat_map(|o| &o.body.vertices);
@@ -168,7 +169,7 @@ fn cameras(specimen: &Specimen, placement: &Pose, organ: &str) -> Vec<CellCamera
     let look = |name: &str, (low, high): (DVec3, DVec3), near: f64| {
         let (middle, size) = (0.5 * (low + high), (high - low).length().max(0.04));
         let target = middle + 0.1 * size * DVec3::Z;
-        let eye = target + near * size * DVec3::new(0.35, -0.75, 0.55);
+        let eye = target + near * size * DVec3::new(0.35, 0.75, 0.55);
         CellCamera {
             name: name.to_owned(),
             view: View::LookAt { eye_m: eye.to_array(), target_m: target.to_array(), up: [0.0, 0.0, 1.0] },
