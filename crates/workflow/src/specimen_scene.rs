@@ -158,8 +158,8 @@ pub(crate) fn source(folder: &Path) -> SpecimenSource {
     SpecimenSource::folder(&folder.display().to_string())
 }
 
-/// Two cameras: one close to the organ, and one that sees the whole specimen. They are on the side of
-/// the room from which its lamp shines (`trocar_sensors`).
+/// Two cameras: one close to the organ, and one that sees the whole specimen. They are on the side
+/// of the room from which its lamp shines (`trocar_sensors`).
 fn cameras(specimen: &Specimen, placement: &Pose, organ: &str) -> Vec<CellCamera> {
     let bounds = |of: &dyn Fn(&str) -> bool| {
         let points = specimen.organs.iter().filter(|o| of(&o.name)).flat_map(|o| &o.body.vertices);

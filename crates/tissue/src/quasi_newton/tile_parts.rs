@@ -202,8 +202,8 @@ mod tests {
         factor.solve(level, &mut unpacked);
         let most = unpacked.iter().fold(0.0f32, |most, x| most.max(x.abs()));
         let squares = |numbers: &[f32]| numbers.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>();
-        // The worst of 17,496 numbers depends on the order of elimination and on the right side: with
-        // others it is up to 4%. The mean hardly does.
+        // The worst of 17,496 numbers depends on the order of elimination and on the right side:
+        // with others it is up to 4%. The mean hardly does.
         for (precise, worst, mean) in [(true, 1e-3, 1e-3), (false, 0.03, 0.012)] {
             tiles.end_whole();
             let whole = solve(&mut tiles, precise);
