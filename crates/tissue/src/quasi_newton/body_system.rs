@@ -24,6 +24,10 @@ const MIN_NODES: usize = 1000;
 /// Sweeps a substep for a body that the quasi-Newton steps gave up.
 const FALLBACK_SWEEPS: usize = 20;
 
+/// Most free nodes of a body whose factor is read with 8 bits a number. What they leave of the
+/// softest motions grows with the body.
+const MAX_ROUGH_NODES: usize = 8_000;
+
 /// The solver of one body.
 pub(crate) struct QuasiNewtonSolver {
     pub(super) settings: QuasiNewton,
@@ -375,7 +379,7 @@ impl QuasiNewtonSolver {
     /// direction = P^-1 direction.
     pub fn precondition(&mut self) {
         // Nothing but the solve keeps the momentum of a free body.
-        let precise = self.is_free();
+        let precise = self.is_free() || self.layout.free > MAX_ROUGH_NODES;
         self.system.apply(self.level, &mut self.iterate.direction, precise);
     }
 
