@@ -7,7 +7,6 @@ use crate::shape::ShapeMeter;
 use crate::state::BodyState;
 use crate::untangle::Untangler;
 use crate::{Body, StepReport, ToolForce};
-use rayon::prelude::*;
 
 /// The solver of one body with its scratch memory.
 pub(crate) trait Solver: Send + Sync + Sized {
@@ -196,6 +195,6 @@ pub(crate) fn for_each<S: Solver>(
     if frame.single_thread || slots.len() < 2 {
         slots.iter_mut().for_each(work);
     } else {
-        slots.par_iter_mut().with_max_len(1).for_each(work);
+        crate::threads::for_each(slots, work);
     }
 }
