@@ -1,4 +1,4 @@
-//! Stepping allocates nothing.
+//! Stepping allocates nothing but what keeps other threads awake.
 
 use glam::DVec3;
 use std::sync::Mutex;
@@ -16,8 +16,10 @@ static ALLOCATOR: &Peak = &PEAK;
 /// One test at a time: all share the count.
 static ALONE: Mutex<()> = Mutex::new(());
 
+/// Two threads share the work of a frame; the second one is kept awake by a job, which is
+/// allocated, about once a frame.
 #[test]
-fn stepping_bodies_that_touch_allocates_nothing() {
+fn stepping_bodies_that_touch_allocates_nothing_else() {
     const FRAMES: usize = 40;
     let _alone = ALONE.lock();
     let low = block([8, 8, 4], 2.5e-3);
@@ -38,7 +40,7 @@ fn stepping_bodies_that_touch_allocates_nothing() {
         let before = PEAK.allocations();
         (0..FRAMES).for_each(|_| assert_eq!(stepper.step(&model, &mut state, &[]).divergence, None));
         let during = PEAK.allocations() - before;
-        assert!(during < FRAMES / 4, "{schedule:?}: {during} allocations in {FRAMES} frames");
+        assert!(during < 2 * FRAMES, "{schedule:?}: {during} allocations in {FRAMES} frames");
     }
 }
 

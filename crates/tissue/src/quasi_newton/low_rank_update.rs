@@ -15,7 +15,7 @@ use super::column_cache::{ColumnCache, MAX_COLUMNS, MAX_NODES};
 use super::dense::{decompose, solve};
 use super::factor::Factor;
 use super::springs::{Springs, Term};
-use crate::threads::for_each;
+use crate::threads::for_each_with;
 use fearless_simd::{Level, dispatch};
 
 /// Greatest number of springs in the update.
@@ -26,6 +26,29 @@ const MAX_SPRINGS: usize = 256;
 const MIN_PARTED: usize = 48;
 const EVEN_ENDS: [f64; 4] = [0.134, 0.293, 0.5, 1.0];
 
+/// Columns that are built side by side.
+const LANES: usize = 8;
+
+/// Room to build columns in.
+struct BuildRoom {
+    /// Products of a spring with all columns of the factor.
+    sums: Vec<f64>,
+    /// The same of several springs, with the columns in use.
+    of_columns: Vec<[f64; LANES]>,
+    /// Rows of the columns.
+    rows: Vec<[f64; LANES]>,
+}
+
+impl BuildRoom {
+    fn new() -> Self {
+        Self {
+            sums: Vec::with_capacity(MAX_COLUMNS),
+            of_columns: Vec::with_capacity(MAX_COLUMNS),
+            rows: Vec::with_capacity(MAX_SPRINGS),
+        }
+    }
+}
+
 /// The difference between the matrix now and the factor.
 pub(super) struct LowRankUpdate {
     /// The springs.
@@ -35,6 +58,8 @@ pub(super) struct LowRankUpdate {
     columns: ColumnCache,
     /// K^-1 + V'V as L D L', by columns: what is below the diagonal of L, and D on it.
     matrix: Vec<f64>,
+    /// Scratch, by part of the matrix.
+    rooms: [BuildRoom; EVEN_ENDS.len()],
     /// Scratch: one number a spring.
     shares: Vec<f64>,
     /// Scratch: one number a column.
@@ -53,6 +78,7 @@ impl LowRankUpdate {
             places: Vec::with_capacity(3 * MAX_SPRINGS),
             columns: ColumnCache::new(),
             matrix: vec![0.0; MAX_SPRINGS * MAX_SPRINGS],
+            rooms: std::array::from_fn(|_| BuildRoom::new()),
             shares: Vec::with_capacity(MAX_SPRINGS),
             of_columns: vec![0.0; MAX_COLUMNS],
             nodes: Vec::with_capacity(MAX_NODES + 12),
@@ -141,7 +167,7 @@ impl LowRankUpdate {
 
     /// K^-1 + V'V, from the diagonal down.
     fn build(&mut self, level: Level) {
-        let Self { springs, places, columns, matrix, .. } = self;
+        let Self { springs, places, columns, matrix, rooms, .. } = self;
         let (n, columns) = (springs.len(), &*columns);
         let (ends, used) = if n < MIN_PARTED { ([1.0; 4], 1) } else { (EVEN_ENDS, EVEN_ENDS.len()) };
         let mut parts: [(usize, &mut [f64]); EVEN_ENDS.len()] = Default::default();
@@ -152,11 +178,9 @@ impl LowRankUpdate {
             *part = (first, numbers);
             (rest, first) = (others, end);
         }
-        for_each(&mut parts[..used], |(first, numbers)| {
-            let mut of_columns = [0.0; MAX_COLUMNS];
-            let of_columns = &mut of_columns[..columns.len()];
-            dispatch!(level, _simd => for (j, column) in (*first..).zip(numbers.chunks_exact_mut(n)) {
-                build_column(springs, places, columns, j, of_columns, column);
+        for_each_with(&mut parts[..used], rooms, |(first, numbers), room| {
+            dispatch!(level, _simd => for (k, numbers) in numbers.chunks_mut(LANES * n).enumerate() {
+                build_columns(springs, places, columns, *first + LANES * k, room, numbers);
             });
         });
     }
@@ -183,29 +207,50 @@ impl LowRankUpdate {
     }
 }
 
-/// Column j of K^-1 + V'V, from the diagonal down.
+/// Columns of K^-1 + V'V from the one of number `first` on, at most [`LANES`], from the diagonal
+/// down.
 #[inline(always)]
-fn build_column(
+fn build_columns(
     springs: &Springs,
     places: &[usize],
     columns: &ColumnCache,
-    j: usize,
-    of_columns: &mut [f64],
-    column: &mut [f64],
+    first: usize,
+    BuildRoom { sums, of_columns, rows }: &mut BuildRoom,
+    numbers: &mut [f64],
 ) {
-    let (terms, (stiffness, range)) = (springs.terms(), springs.range(j));
-    // All columns of the factor times this spring's.
-    of_columns.fill(0.0);
-    for (term, place) in terms[range.clone()].iter().zip(&places[range]) {
-        for (c, along) in term.along.iter().enumerate() {
-            let products = columns.products(*place, c);
-            of_columns.iter_mut().zip(products).for_each(|(sum, product)| *sum += f64::from(*along) * product);
+    let (terms, n) = (springs.terms(), springs.len());
+    let count = numbers.len() / n;
+    sums.resize(columns.len(), 0.0);
+    of_columns.resize(columns.len().max(of_columns.len()), [0.0; LANES]);
+    for lane in 0..count {
+        // All columns of the factor times this spring's.
+        let (_, range) = springs.range(first + lane);
+        sums.fill(0.0);
+        for (term, place) in terms[range.clone()].iter().zip(&places[range]) {
+            for (c, along) in term.along.iter().enumerate() {
+                let products = columns.products(*place, c);
+                sums.iter_mut().zip(products).for_each(|(sum, product)| *sum += f64::from(*along) * product);
+            }
+        }
+        for place in columns.used() {
+            (3 * place..3 * place + 3).for_each(|column| of_columns[column][lane] = sums[column]);
         }
     }
-    for (number, (_, range)) in column.iter_mut().zip(springs.ranges()).skip(j) {
-        *number = along(&terms[range.clone()], &places[range], of_columns);
+    rows.clear();
+    for i in first..n {
+        let (_, range) = springs.range(i);
+        let mut row = [0.0; LANES];
+        for (term, place) in terms[range.clone()].iter().zip(&places[range]) {
+            for (along, lanes) in term.along.iter().zip(&of_columns[3 * place..3 * place + 3]) {
+                row.iter_mut().zip(lanes).for_each(|(sum, number)| *sum += f64::from(*along) * number);
+            }
+        }
+        rows.push(row);
     }
-    column[j] += 1.0 / f64::from(stiffness);
+    for (lane, column) in numbers.chunks_exact_mut(n).enumerate() {
+        column[first..].iter_mut().zip(&*rows).for_each(|(number, row)| *number = row[lane]);
+        column[first + lane] += 1.0 / f64::from(springs.range(first + lane).0);
+    }
 }
 
 /// Product of a spring's vectors and a vector of one number for each column.
