@@ -55,6 +55,8 @@ pub(crate) struct ContactSet {
     next_anchors: Vec<Anchor>,
     /// Where the colliders are in the substep; None: the tool has no motion.
     placed: Vec<Option<Placed>>,
+    /// The colliders that vertices may touch in it.
+    reachable: Vec<u32>,
     /// Scratch: nodes of a contact with their shares.
     shares: Vec<(u32, f32)>,
     /// Whether a vertex is one of `surface`.
@@ -97,6 +99,7 @@ impl ContactSet {
             pressed: Vec::new(),
             first_pressed: vec![0; body.len() + 1],
             placed: Vec::new(),
+            reachable: Vec::new(),
             shares: Vec::new(),
             outer: outer(&surface, vertices),
             touching: vec![false; vertices],

@@ -38,8 +38,10 @@ pub(super) struct FeatureContacts {
     vertices: Vec<u32>,
     /// Their positions at the substep's beginning, by vertex (m).
     x: Vec<Vec3A>,
-    /// Scratch: balls around [`CHUNK`] triangles each.
+    /// Balls around [`CHUNK`] triangles each, and the positions that they are for (m): a body that
+    /// rests keeps them.
     balls: Vec<(Vec3A, f32)>,
+    balls_at: Vec<Vec3A>,
     /// Scratch: whether a vertex is one of `vertices`.
     is_near: Vec<bool>,
     /// Scratch: features of one collider.
@@ -70,11 +72,14 @@ impl FeatureContacts {
         self.x.resize(body.vertex_count(), Vec3A::ZERO);
         let triangles = &body.surface.triangles;
         let corners = |t: u32| triangles[t as usize].map(|i| state.x[i as usize]);
-        self.balls.clear();
+        let mut have_balls = self.balls_at == state.x;
         for (collider, placed) in frame.colliders.iter().zip(placed) {
             if let (Some((ends, radius)), Some(placed)) = (axis(&collider.shape), placed) {
-                if self.balls.is_empty() {
+                if !have_balls {
+                    self.balls.clear();
                     self.balls.extend(triangles.chunks(CHUNK).map(|chunk| ball(chunk, &state.x)));
+                    self.balls_at.clone_from(&state.x);
+                    have_balls = true;
                 }
                 let [a, b] = placed.at_beginning(body, ends);
                 let far = reach + placed.reach + radius;

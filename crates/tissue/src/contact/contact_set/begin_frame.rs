@@ -1,6 +1,7 @@
 //! The beginning of a frame: which vertices may touch something in it.
 
 use super::ContactSet;
+use super::find::bounds;
 use crate::contact::{ToolForce, compliant_grasp, tool_placement};
 use crate::frame::Frame;
 use crate::state::BodyState;
@@ -62,6 +63,7 @@ impl ContactSet {
         let fall = dt * dt * frame.gravity.length() as f32;
         let carried = frame.carried(body, false);
         self.reach = REACH_MARGIN + carried as f32 + 2.5 * (dt * fastest + fall);
+        self.list_reachable(bounds(self.surface.iter().map(|i| state.x[*i as usize])));
         // A loose body falls in this frame; a held one may not.
         let loose = !self.fixed.contains(&true) && self.compliant.is_empty();
         let drop = if loose { dt * dt * frame.gravity.as_vec3a() } else { Vec3A::ZERO };

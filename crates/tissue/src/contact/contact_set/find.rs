@@ -40,8 +40,8 @@ impl ContactSet {
         if self.is_bound && is_node {
             return;
         }
-        for (c, (collider, placed)) in frame.colliders.iter().zip(&self.placed).enumerate() {
-            let Some(placed) = placed else { continue };
+        for c in &self.reachable {
+            let (collider, Some(placed)) = (&frame.colliders[*c as usize], &self.placed[*c as usize]) else { continue };
             let far = self.reach + placed.reach;
             if (x - placed.centre).length_squared() > (placed.radius + far) * (placed.radius + far)
                 || self.holes.lets_through(collider.tool, vertex)
@@ -54,8 +54,23 @@ impl ContactSet {
                 let height = nearest.distance - collider.rest_offset;
                 let point = placed.to.transform(p - height * nearest.normal) - body.origin;
                 let normal = placed.to.rotation * nearest.normal;
-                let source = Source::Collider(c as u32);
+                let source = Source::Collider(*c);
                 found(source, height as f32, normal.as_vec3a(), point.as_vec3a(), p.as_vec3a(), 1.0);
+            }
+        }
+    }
+
+    /// Lists the colliders that a vertex in a box may touch; the others need not be tried.
+    pub(super) fn list_reachable(&mut self, (low, high): (Vec3A, Vec3A)) {
+        let Self { placed, reachable, reach, .. } = self;
+        reachable.clear();
+        for (c, placed) in placed.iter().enumerate() {
+            let Some(placed) = placed else { continue };
+            let far = *reach + placed.reach;
+            let off = (low - placed.centre).max(placed.centre - high).max(Vec3A::ZERO);
+            // Rounding keeps the order: no vertex in the box is nearer.
+            if off.length_squared() <= (placed.radius + far) * (placed.radius + far) {
+                reachable.push(c as u32);
             }
         }
     }
@@ -71,6 +86,7 @@ impl ContactSet {
         way: impl Fn(usize) -> Vec3A,
     ) {
         tool_placement::place(frame, body, from, to, &mut self.placed);
+        self.list_reachable(bounds(self.near.iter().map(|i| x(*i as usize))));
         let (mut contacts, mut places) = (std::mem::take(&mut self.contacts), std::mem::take(&mut self.places));
         contacts.clear();
         places.clear();
@@ -167,4 +183,10 @@ impl ContactSet {
             Source::Support(_) | Source::Body(_) | Source::Grasp(..) | Source::Tether(_) => place,
         }
     }
+}
+
+/// The smallest and the largest coordinates of points.
+pub(super) fn bounds(points: impl Iterator<Item = Vec3A>) -> (Vec3A, Vec3A) {
+    let none = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
+    points.fold(none, |(low, high), x| (low.min(x), high.max(x)))
 }
