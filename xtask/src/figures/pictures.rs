@@ -33,9 +33,11 @@ enum Source {
     Study(&'static str, &'static [&'static str], &'static [&'static str]),
     /// A surface of `DATA`: the lift of its organ.
     Lift(&'static str),
+    /// A surface of `DATA`: how long its meshes take.
+    Meshes(&'static str),
 }
 
-use Source::{Bench, Lift, Render, Study, Task};
+use Source::{Bench, Lift, Meshes, Render, Study, Task};
 
 /// A recording and what is rendered beside it.
 const BESIDE: &[&str] = &["the real", "the rendered"];
@@ -74,6 +76,7 @@ const PICTURES: &[Picture] = &[
         "similarity-load.svg",
         Study("similarity", &["Phantom-a, lift 2, under", "Phantom-a, lift 3, under"], BESIDE),
     ),
+    picture("meshing.svg", Meshes("openhelp/Liver.stl")),
     picture("liver.svg", Lift("openhelp/Liver.stl")),
     picture("stomach.svg", Lift("openhelp/Stomach.stl")),
     picture("spleen.svg", Lift("openhelp/Spleen.stl")),
@@ -125,19 +128,31 @@ impl Picture {
                 write(Path::new(&file), &sheet(&sections(&text, titles), figures, 2)?)
             }
             Lift(surface) => {
-                let surface = format!("{DATA}/{surface}");
-                if !Path::new(&surface).is_file() {
-                    eprintln!("== {file}\n   skipped: there is no {surface}");
-                    return Ok(());
-                }
+                let Some(surface) = real(surface, &file) else { return Ok(()) };
                 let (specimen, lift) =
                     (anew(&format!("{}-specimen", self.file))?, anew(&format!("{}-lift", self.file))?);
                 run(trocar, &format!("reconstruct --surface {surface} --units mm --output {specimen}"))?;
                 run(trocar, &format!("simulate {specimen} --design live-pose --output {lift}"))?;
                 write(Path::new(&file), &sheet(&read(&Path::new(&lift).join("report.html"))?, &["Lifted"], 1)?)
             }
+            Meshes(surface) => {
+                let Some(surface) = real(surface, &file) else { return Ok(()) };
+                let folder = anew(&format!("{}-meshes", self.file))?;
+                run(trocar, &format!("bench meshing {surface} --output {folder}"))?;
+                write(Path::new(&file), &sheet(&read(&Path::new(&folder).join("report.html"))?, &["Time"], 2)?)
+            }
         }
     }
+}
+
+/// The path of a surface of `DATA`. None if it is not beside the project: then `file` is skipped.
+fn real(surface: &str, file: &str) -> Option<String> {
+    let surface = format!("{DATA}/{surface}");
+    let there = Path::new(&surface).is_file();
+    if !there {
+        eprintln!("== {file}\n   skipped: there is no {surface}");
+    }
+    there.then_some(surface)
 }
 
 /// The sections of a page whose titles begin with one of `titles`; all if there are none.
@@ -166,13 +181,12 @@ mod tests {
     use super::*;
 
     /// Pictures that no command of `PICTURES` makes: see there.
-    const OTHERS: [&str; 8] = [
+    const OTHERS: [&str; 7] = [
         "cup-data.jpg",
         "d405-depth-shown.png",
         "d405-labels.png",
         "k4a-mug.jpg",
         "lift-beside.webp",
-        "meshing.png",
         "learning-pictures.png",
         "learning.png",
     ];
