@@ -59,7 +59,7 @@ fn main() -> ExitCode {
             tools::fetch();
             ExitCode::SUCCESS
         }
-        ["figures", names @ ..] => code(told(&figures::run(names))),
+        ["figures", names @ ..] if names.iter().all(|name| !name.starts_with('-')) => code(told(&figures::run(names))),
         ["aarch64"] => code(told(&aarch64::check())),
         ["peers"] => code(told(&peers::run())),
         ["fuzz"] => fuzz(1_000_000),

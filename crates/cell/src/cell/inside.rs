@@ -24,9 +24,13 @@ pub(super) fn crossings(world: &World, organ: usize, segments: &[[DVec3; 2]]) ->
     let side = |p: &DVec3| p.cmplt(low).bitmask() | p.cmpgt(high).bitmask() << 3;
     let sides: Vec<u32> = places.iter().map(side).collect();
     let mut found = Vec::new();
+    if sides.iter().fold(u32::MAX, |all, sides| all & sides) != 0 {
+        // The whole organ is beyond one side of the box round the segments.
+        return found;
+    }
     for nodes in body.tets() {
         let t = nodes.map(|i| i as usize);
-        // All corners are beyond one side of the box round the segments.
+        // All corners are.
         if t.iter().fold(u32::MAX, |all, i| all & sides[*i]) != 0 {
             continue;
         }
