@@ -142,25 +142,63 @@ fn friction_acts_between_the_vertices_too() {
     assert!(slips > 0.0 && slips < 1.02 * 0.02 * pressing, "up to a limit: {slips} of {pressing} N");
 }
 
-/// The same bits for any number of threads, and when continued from the middle.
+/// The motion of the tool that is pressed into the block, in a frame.
+fn pressing(frame: i32) -> [ToolMotion; 1] {
+    let place = |k: i32| at(DVec3::new(1e-5 * f64::from(k), 0.0, 20e-3 - 1e-4 * f64::from(k)));
+    [ToolMotion { from: place(frame), to: place(frame + 1) }]
+}
+
+/// The same bits for any number of threads, and when continued from the middle: in a new stepper,
+/// or in the one that went on.
 #[test]
 fn it_repeats_to_the_bit() {
-    let run = |threads: usize, again: bool| {
+    #[derive(PartialEq)]
+    enum Again {
+        Never,
+        New,
+        Restored,
+    }
+    let run = |threads: usize, again: Again| {
         let (model, _) = scene(12e3, bar(), 0.4, ToolContact::Surface);
         let mut state = State::new(&model);
         let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, threads).unwrap();
         for frame in 0..40 {
-            if again && frame == 20 {
+            if frame == 20 && again == Again::New {
                 state = state.clone();
                 stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, threads).unwrap();
             }
-            let place = |k: i32| at(DVec3::new(1e-5 * f64::from(k), 0.0, 20e-3 - 1e-4 * f64::from(k)));
-            stepper.step(&model, &mut state, &[ToolMotion { from: place(frame), to: place(frame + 1) }]);
+            if frame == 20 && again == Again::Restored {
+                let mut later = state.clone();
+                (20..60)
+                    .for_each(|frame| assert!(stepper.step(&model, &mut later, &pressing(frame)).divergence.is_none()));
+                assert_ne!(later.hash(), state.hash());
+            }
+            stepper.step(&model, &mut state, &pressing(frame));
         }
         state.hash()
     };
-    assert_eq!(run(1, false), run(2, false));
-    assert_eq!(run(1, false), run(1, true));
+    let alone = run(1, Again::Never);
+    assert_eq!(alone, run(2, Again::Never));
+    assert_eq!(alone, run(1, Again::New));
+    assert_eq!(alone, run(1, Again::Restored));
+}
+
+/// A stepper of one model serves another one with the other kind of contact: nothing of the first
+/// is left.
+#[test]
+fn a_stepper_serves_both_kinds_of_contact() {
+    let [surface, vertices] =
+        [ToolContact::Surface, ToolContact::Vertices].map(|contact| scene(12e3, bar(), 0.4, contact).0);
+    let press = |stepper: &mut Stepper, model: &Model| {
+        let mut state = State::new(model);
+        (0..40).for_each(|frame| assert_eq!(stepper.step(model, &mut state, &pressing(frame)).divergence, None));
+        state.hash()
+    };
+    let new = |model| Stepper::new(model, SolverSettings::FAST, FRAME, 1).unwrap();
+    let mut stepper = new(&surface);
+    let [of_surface, of_vertices] = [&surface, &vertices].map(|model| press(&mut stepper, model));
+    assert_ne!(of_surface, of_vertices);
+    assert_eq!(of_vertices, press(&mut new(&vertices), &vertices));
 }
 
 /// Force of the block on two equal rods that come 1 mm into its top, 18 mm apart (N), when the

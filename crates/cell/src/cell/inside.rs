@@ -30,7 +30,7 @@ pub(super) fn crossings(world: &World, organ: usize, segments: &[[DVec3; 2]]) ->
     }
     for nodes in body.tets() {
         let t = nodes.map(|i| i as usize);
-        // All corners are.
+        // All corners are beyond one side of the box.
         if t.iter().fold(u32::MAX, |all, i| all & sides[*i]) != 0 {
             continue;
         }

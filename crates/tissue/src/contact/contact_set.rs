@@ -55,7 +55,7 @@ pub(crate) struct ContactSet {
     next_anchors: Vec<Anchor>,
     /// Where the colliders are in the substep; None: the tool has no motion.
     placed: Vec<Option<Placed>>,
-    /// The colliders that vertices may touch in it.
+    /// The colliders that vertices may touch in the frame or substep that was begun last.
     reachable: Vec<u32>,
     /// Scratch: nodes of a contact with their shares.
     shares: Vec<(u32, f32)>,

@@ -38,9 +38,9 @@ pub(super) struct FeatureContacts {
     vertices: Vec<u32>,
     /// Their positions at the substep's beginning, by vertex (m).
     x: Vec<Vec3A>,
-    /// Balls around [`CHUNK`] triangles each, and the positions that they are for (m): a body that
-    /// rests keeps them.
+    /// Balls around [`CHUNK`] triangles each. A body that rests keeps them.
     balls: Vec<(Vec3A, f32)>,
+    /// The positions that they are for (m).
     balls_at: Vec<Vec3A>,
     /// Scratch: whether a vertex is one of `vertices`.
     is_near: Vec<bool>,
@@ -54,6 +54,14 @@ pub(super) struct FeatureContacts {
 }
 
 impl FeatureContacts {
+    /// Forgets what the last frame found.
+    pub fn clear(&mut self) {
+        self.near.clear();
+        self.ends.clear();
+        self.vertices.clear();
+        self.anchors.clear();
+    }
+
     /// Begins a frame: finds the triangles that the `placed` colliders may meet in it. A vertex at
     /// most `reach` from a surface may touch it (m). Triangles in `holes` let the tools through.
     pub fn begin_frame(
@@ -65,10 +73,8 @@ impl FeatureContacts {
         holes: &HoleVertices,
         reach: f32,
     ) {
+        self.clear();
         self.anchors.clone_from(&state.feature_anchors);
-        self.near.clear();
-        self.ends.clear();
-        self.vertices.clear();
         self.x.resize(body.vertex_count(), Vec3A::ZERO);
         let triangles = &body.surface.triangles;
         let corners = |t: u32| triangles[t as usize].map(|i| state.x[i as usize]);

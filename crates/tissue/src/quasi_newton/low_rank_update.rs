@@ -35,7 +35,7 @@ struct BuildRoom {
     sums: Vec<f64>,
     /// The same of several springs, with the columns in use.
     of_columns: Vec<[f64; LANES]>,
-    /// Rows of the columns.
+    /// The numbers of the columns, by row.
     rows: Vec<[f64; LANES]>,
 }
 
@@ -207,8 +207,8 @@ impl LowRankUpdate {
     }
 }
 
-/// Columns of K^-1 + V'V from the one of number `first` on, at most [`LANES`], from the diagonal
-/// down.
+/// Columns of K^-1 + V'V from the one of number `first` on, at most [`LANES`], from row `first`
+/// down. What is above the diagonal is not read.
 #[inline(always)]
 fn build_columns(
     springs: &Springs,
@@ -268,13 +268,75 @@ fn along(terms: &[Term], places: &[usize], of_columns: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::LowRankUpdate;
+    use super::{LowRankUpdate, along};
     use crate::quasi_newton::factor::Factor;
     use crate::quasi_newton::springs::{Springs, Term};
-    use crate::{BodyDescription, ConstitutiveModel, Isa, Material, ModelBuilder};
+    use crate::{BodyDescription, ConstitutiveModel, Isa, Material, Model, ModelBuilder};
     use fearless_simd::dispatch;
     use glam::Vec3A;
     use trocar_testing::blocks::block;
+
+    fn model(cells: [usize; 3]) -> Model {
+        let mesh = block(cells, 2e-3);
+        let pinned = (0..mesh.vertices.len() as u32).filter(|i| mesh.vertices[*i as usize].z < 1e-3).collect();
+        let material = Material {
+            model: ConstitutiveModel::StableNeoHookean,
+            young_modulus: 12e3,
+            poisson_ratio: 0.45,
+            density: 1200.0,
+            viscosity: 0.0,
+        };
+        let mut builder = ModelBuilder::new();
+        let body = BodyDescription { name: "block".into(), mesh: &mesh, material, pinned, supports: vec![] };
+        builder.body(body).unwrap();
+        builder.build().unwrap()
+    }
+
+    /// The matrix has the bits of products one by one, whether or not it is built in parts and
+    /// columns fill them.
+    #[test]
+    fn columns_side_by_side_have_the_same_bits() {
+        let model = model([4, 4, 6]);
+        let level = Isa::detect().level();
+        let mut factor = Factor::new(&model.bodies[0], 1e-2).unwrap();
+        let free = factor.order.len();
+        factor.set_step(&vec![1e-3; free], 1e-2);
+        assert!(factor.factorise(level, &vec![false; free], &vec![0.0; free]));
+        for (n, threads) in [1, 8, 9, 47, 48, 100].into_iter().flat_map(|n| [(n, 1), (n, 2)]) {
+            let mut springs = Springs::with_capacity(0);
+            for k in 0..n {
+                let along = [1.0, 0.1 * k as f32, -0.3];
+                let term =
+                    |node: usize, share: f32| Term { node: (node % free) as u32, along: along.map(|u| share * u) };
+                springs.push(50.0 + k as f32, [term(7 * k, 1.0), term(11 * k + 3, 0.4)].into_iter().take(1 + k % 2));
+            }
+            let mut update = LowRankUpdate::new();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                update.set(level, &factor, &mut springs);
+                update.build(level);
+            });
+            assert_eq!(update.springs.len(), n);
+            let LowRankUpdate { springs, places, columns, matrix, .. } = &update;
+            let terms = springs.terms();
+            for j in 0..n {
+                let (stiffness, range) = springs.range(j);
+                let mut of_columns = vec![0.0; columns.len()];
+                for (term, place) in terms[range.clone()].iter().zip(&places[range]) {
+                    for (c, along) in term.along.iter().enumerate() {
+                        let products = columns.products(*place, c).iter();
+                        of_columns.iter_mut().zip(products).for_each(|(sum, p)| *sum += f64::from(*along) * p);
+                    }
+                }
+                for i in j..n {
+                    let (_, range) = springs.range(i);
+                    let product = along(&terms[range.clone()], &places[range], &of_columns);
+                    let number = product + if i == j { 1.0 / f64::from(stiffness) } else { 0.0 };
+                    assert_eq!(matrix[j * n + i].to_bits(), number.to_bits(), "{i} {j} of {n}, {threads} threads");
+                }
+            }
+        }
+    }
 
     /// Nodes that press in the factor and now, softly or hard, a node that no longer does, and
     /// springs between nodes: a solve with the update is that with a factor of all that.
@@ -282,19 +344,7 @@ mod tests {
     fn an_updated_solve_is_that_of_the_sum() {
         // The tree of the larger one is cut into parts.
         for cells in [[4, 4, 6], [14, 14, 24]] {
-            let mesh = block(cells, 2e-3);
-            let pinned = (0..mesh.vertices.len() as u32).filter(|i| mesh.vertices[*i as usize].z < 1e-3).collect();
-            let material = Material {
-                model: ConstitutiveModel::StableNeoHookean,
-                young_modulus: 12e3,
-                poisson_ratio: 0.45,
-                density: 1200.0,
-                viscosity: 0.0,
-            };
-            let mut builder = ModelBuilder::new();
-            let body = BodyDescription { name: "block".into(), mesh: &mesh, material, pinned, supports: vec![] };
-            builder.body(body).unwrap();
-            let model = builder.build().unwrap();
+            let model = model(cells);
             let level = Isa::detect().level();
             let factors = || {
                 let mut factor = Factor::new(&model.bodies[0], 1e-2).unwrap();

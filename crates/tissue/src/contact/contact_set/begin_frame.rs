@@ -40,6 +40,8 @@ impl ContactSet {
         self.find_near(frame, body, state);
         if frame.tool_contact == ToolContact::Surface {
             self.features.begin_frame(frame, body, state, &self.placed, &self.holes, self.reach);
+        } else {
+            self.features.clear();
         }
     }
 

@@ -16,7 +16,8 @@ impl ContactSet {
     /// Calls `found` for each source within reach of a `vertex` at `x`. Its arguments are the
     /// source, the vertex's height above it now, the normal and a point of its plane at the
     /// substep's end, the vertex in the frame of the source, and a factor of the contact stiffness,
-    /// which is not 1 for a field, because its penalty is along its `up`.
+    /// which is not 1 for a field, because its penalty is along its `up`. The vertex is in the box of
+    /// the last [`Self::list_reachable`].
     #[inline(always)]
     pub(super) fn for_sources(
         &self,
@@ -60,7 +61,8 @@ impl ContactSet {
         }
     }
 
-    /// Lists the colliders that a vertex in a box may touch; the others need not be tried.
+    /// Lists the colliders that a vertex in a box may touch, for [`Self::for_sources`]. Where
+    /// positions are not finite the list has no meaning: then the frame's beginning is restored.
     pub(super) fn list_reachable(&mut self, (low, high): (Vec3A, Vec3A)) {
         let Self { placed, reachable, reach, .. } = self;
         reachable.clear();
