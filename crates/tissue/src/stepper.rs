@@ -20,7 +20,7 @@ const MIN_THREADED_NODES: usize = 4000;
 /// Advances states of one model.
 ///
 /// It owns all scratch memory: stepping allocates nothing but lists of contacts that become longer
-/// than before, and, on several threads, a task for each of the others.
+/// than before, and, on several threads, small tasks that keep the others awake.
 ///
 /// ```
 /// use trocar_tissue::{ModelBuilder, SolverSettings, State, Stepper};

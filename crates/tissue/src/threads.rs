@@ -82,12 +82,15 @@ pub(crate) fn join<A: Send, B: Send>(first: impl FnOnce() -> A + Send, second: i
     section(|| rayon::join(first, second))
 }
 
-/// Does `work` that several threads share, and keeps them awake for the next.
+/// Does `work` that several threads share, and keeps them awake for the next, unless this section
+/// is a part of another one.
 fn section<R>(work: impl FnOnce() -> R) -> R {
     SECTIONS.set(SECTIONS.get() + 1);
     let result = work();
     SECTIONS.set(SECTIONS.get() - 1);
-    keep_awake();
+    if SECTIONS.get() == 0 {
+        keep_awake();
+    }
     result
 }
 
