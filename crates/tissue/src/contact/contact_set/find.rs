@@ -16,8 +16,8 @@ impl ContactSet {
     /// Calls `found` for each source within reach of a `vertex` at `x`. Its arguments are the
     /// source, the vertex's height above it now, the normal and a point of its plane at the
     /// substep's end, the vertex in the frame of the source, and a factor of the contact stiffness,
-    /// which is not 1 for a field, because its penalty is along its `up`. The vertex is in the box of
-    /// the last [`Self::list_reachable`].
+    /// which is not 1 for a field, because its penalty is along its `up`. The vertex is in the box
+    /// of the last [`Self::list_reachable`].
     #[inline(always)]
     pub(super) fn for_sources(
         &self,
