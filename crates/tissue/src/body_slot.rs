@@ -7,6 +7,11 @@ use crate::shape::ShapeMeter;
 use crate::state::BodyState;
 use crate::untangle::Untangler;
 use crate::{Body, StepReport, ToolForce};
+use rayon::prelude::*;
+
+/// Fewest nodes of bodies for whose sections other threads wait awake. The wait costs the
+/// processor's time, and a job that is allocated.
+const MIN_AWAKE_NODES: usize = 2000;
 
 /// The solver of one body with its scratch memory.
 pub(crate) trait Solver: Send + Sync + Sized {
@@ -194,6 +199,8 @@ pub(crate) fn for_each<S: Solver>(
 ) {
     if frame.single_thread || slots.len() < 2 {
         slots.iter_mut().for_each(work);
+    } else if slots.iter().map(|slot| slot.body.len()).sum::<usize>() < MIN_AWAKE_NODES {
+        slots.par_iter_mut().with_max_len(1).for_each(work);
     } else {
         crate::threads::for_each(slots, work);
     }

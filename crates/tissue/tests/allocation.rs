@@ -16,7 +16,6 @@ static ALLOCATOR: &Peak = &PEAK;
 /// One test at a time: all share the count.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// On one thread: the jobs that keep others awake between sections that bodies share are allocated.
 #[test]
 fn stepping_bodies_that_touch_allocates_nothing() {
     const FRAMES: usize = 40;
@@ -33,7 +32,7 @@ fn stepping_bodies_that_touch_allocates_nothing() {
     let model = builder.build().unwrap();
     for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
         let mut state = State::new(&model);
-        let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
+        let mut stepper = Stepper::new(&model, schedule, FRAME, 2).unwrap();
         // Lists grow to their greatest length.
         (0..30).for_each(|_| assert_eq!(stepper.step(&model, &mut state, &[]).divergence, None));
         let before = PEAK.allocations();
